@@ -18,6 +18,11 @@ MATERIAL = 0.05
 """Share of the white variance from which on spikes or a louder stretch count: N is 2.5 % larger by it."""
 BLOCKS, SHORTEST_BLOCK = 128, 64
 LOUDER = 1.5  # of the variance of a block over the usual one
+BRIEF = (8, 32)  # samples of a short burst, over which its power is a mean
+CAPPED = 5.0  # standard deviations to which a sample counts in it: one or two of heavy tails make no burst
+RARE = 6.0
+"""Standard deviations of the cube root of such a mean that are rare: of normal noise 1e-9 of them."""
+FEWEST_BURSTS = 3  # of which a cause that comes again, as steps on the floor, is told: one or two may be spikes
 JUMP = 7.0
 """Standard deviations of a change of the mean: 3e-12 of normal ones, with the spread known to a fifth."""
 SHORTEST, FEWEST = 16, 32  # samples of a mean, and means of a record by whose changes their spread is known
@@ -29,9 +34,11 @@ SHARP = 2.0
 class Disturbance:
     """A part of a record that its noise does not explain.
 
-    kind : ``spikes``, ``loud``, ``stuck`` or ``jump``
+    kind : ``spikes``, ``loud``, ``bursts``, ``stuck`` or ``jump``
     start, stop : samples, from the first to behind the last; of a jump where it is
-    count : of spikes, or of samples · size : largest spike, change of the mean, or standard deviation; unit of the record
+    count : of spikes, of bursts, or of samples
+    size : largest spike or sample of a burst, change of the mean, or standard deviation; unit of the record
+    material : whether terms of noise would be wrong by it
     """
 
     kind: str
@@ -39,13 +46,14 @@ class Disturbance:
     stop: int
     count: int
     size: float
+    material: bool = True
 
 
 def disturbances(record: Array) -> list[Disturbance]:
-    """Spikes, louder stretches and jumps of a record (n,) at rest, each by what is usual in the rest of it.
+    """Spikes, bursts, louder stretches and jumps of a record (n,) at rest, each by what is usual in the rest of it.
 
     Noise of any colour whose steps are normal has none of them, nor a drift or a slow wave. Spikes and loud stretches count only
-    where they change the white noise.
+    where they change the white noise; short bursts that come again are told in any case.
     """
     quick = record - median_filter(record, NEIGHBOURS, mode="nearest")
     spread = max(_spread(quick), _spread(np.diff(record)) / np.sqrt(2.0))
@@ -60,6 +68,8 @@ def disturbances(record: Array) -> list[Disturbance]:
     if float(np.sum(quick[rows] ** 2)) > MATERIAL * float(np.sum(rest**2)):
         worst = float(quick[rows[np.argmax(np.abs(quick[rows]))]])
         found.insert(0, Disturbance("spikes", int(rows[0]), int(rows[-1]) + 1, rows.size, worst))
+        within[rows] = True
+    found += _brief(np.where(within, 0.0, quick), float(np.sum(rest**2)))
     return found + [one for one in _jumps(record - np.where(far, quick, 0.0)) if not within[one.start]]
 
 
@@ -76,6 +86,7 @@ def disturbance_texts(found: Sequence[Disturbance], rate_hz: float, unit: str) -
                 "spikes": f"{first.count} spikes between {start:.6g} and {stop:.6g} s, the largest {size}",
                 "stuck": f"the output repeats itself from {start:.6g} to {stop:.6g} s{more}",
                 "loud": f"the noise is louder from {start:.6g} to {stop:.6g} s{more}",
+                "bursts": f"{first.count} short bursts or more between {start:.6g} and {stop:.6g} s, the largest {size}",
                 "jump": f"the mean jumps by {size} at {start:.6g} s{more}",
             }[kind]
         )
@@ -105,7 +116,7 @@ def _spread(values: Array) -> float:
 
 
 def _loud(quick: Array) -> Flags:
-    """Blocks whose quick noise is far above that of the others, and their neighbours, which may be loud in part."""
+    """Stretches whose quick noise is far above the usual one: found by blocks, with the edges where the likelihood has them."""
     loud = np.zeros(quick.size, dtype=bool)
     size = max(quick.size // BLOCKS, SHORTEST_BLOCK)
     count = quick.size // size
@@ -116,8 +127,46 @@ def _loud(quick: Array) -> Flags:
     scatter = max(_spread(power), usual * np.sqrt(2.0 / size))
     own = (power > LOUDER * usual) & (power - usual > FAR * scatter)
     if float(np.sum(power[own] - usual)) > MATERIAL * count * usual:
-        loud[: count * size] = np.repeat(np.convolve(own, np.ones(3), "same") > 0, size)
+        for first, last in zip(*runs_of(own), strict=True):
+            high = float(power[first:last].max())
+            # of each sample, by how much more likely it is of the louder noise than of the usual one
+            gain = 0.5 * (quick**2 * (1.0 / usual - 1.0 / high) - np.log(high / usual))
+            begin, end = max(first - 1, 0) * size, min(last + 1, count) * size
+            start = begin + int(np.argmax(np.cumsum(gain[begin : (first + 1) * size][::-1])[::-1]))
+            middle = (last - 1) * size
+            loud[start : middle + 1 + int(np.argmax(np.cumsum(gain[middle:end])))] = True
     return loud
+
+
+def _brief(quick: Array, whole: float) -> list[Disturbance]:
+    """Short bursts that come again, as one disturbance, from a record's quick part (n,) without what is told otherwise.
+
+    The cube root of a mean square is nearly normal (Wilson and Hilferty), so that its own spread over the record tells what is
+    usual, whatever the correlation of the noise.
+
+    Parameters
+    ----------
+    whole : sum of the squares of the record's noise
+    """
+    inside: Flags = np.zeros(quick.size, dtype=bool)
+    most = CAPPED * _spread(quick)
+    capped = np.clip(quick, -most, most)
+    for size in BRIEF:
+        if quick.size < FEWEST * size:
+            break
+        root = np.cbrt(np.convolve(capped**2, np.full(size, 1.0 / size), "valid"))
+        spread = _spread(root)
+        for place in np.flatnonzero(root - np.median(root) > RARE * spread) if spread > 0.0 else ():
+            inside[place : place + size] = True
+    starts, stops = runs_of(inside)
+    if not starts.size:
+        return []
+    apart = np.concatenate([[True], starts[1:] - stops[:-1] > BESIDE])
+    if np.count_nonzero(apart) < FEWEST_BURSTS:
+        return []
+    largest = float(quick[inside][np.argmax(np.abs(quick[inside]))])
+    material = float(np.sum(quick[inside] ** 2)) > MATERIAL * whole
+    return [Disturbance("bursts", int(starts[0]), int(stops[-1]), int(np.count_nonzero(apart)), largest, material)]
 
 
 def _jumps(record: Array) -> list[Disturbance]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, lfilter, sosfiltfilt
 
-from inertial.arrays import Array, Index
+from inertial.arrays import Array
 from inertial.dynamics.spectra import STANDARD_GRAVITY
 from inertial.errors import NotIdentified
 
@@ -74,7 +74,7 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
             f"shock: the largest excursion is {y[top]:.3g}, {8.0 * noise:.3g} is needed above a noise of "
             f"{noise:.3g}; check the trigger"
         )
-    low, high = _span(y, top, TOP * y[top])
+    low, high = span(y, top, TOP * y[top])
     places = np.arange(low, high + 1)
     if places.size < 5:
         raise NotIdentified(
@@ -111,36 +111,8 @@ HALF_WIDTH = 2.0 / 3.0
 """Part of a half sine's duration between the points at half of its peak."""
 CUT = 6.0
 """Corner of the low-pass behind which a pulse is measured, over its duration: it takes 0.3 % off a half sine."""
-FINE, CLOSE = 24.0, 12
-"""Samples of a pulse from which on a lone one shows, and those about it that are smooth."""
 _ALIKE = 0.15
 _SETTLED = 0.02
-
-
-def lone_samples(record: Array, rate_hz: float, duration_s: float, share: float = 0.1) -> Index:
-    """Samples (m,) of a record (n,) that depart alone, by a ``share`` of its range and above the noise: a faulty data line.
-
-    A sample that is off by g has a second difference of −2·g and its neighbours one of g each; a pulse has nearly the same
-    everywhere, and a ringing changes it from sample to sample. None where a pulse has few samples, and kinks as sharp.
-    """
-    if rate_hz * duration_s < FINE or record.size < 2 * CLOSE:
-        return np.zeros(0, dtype=np.intp)
-    bent = np.diff(record, 2)
-    off = np.zeros(record.size)
-    off[2:-2] = (bent[:-2] - 2.0 * bent[1:-1] + bent[2:]) / 6.0
-    size = np.abs(off)
-    limit = max(share * float(np.ptp(record)), 12.0 * float(np.median(size)))
-    return np.array(
-        [
-            k
-            for k in np.flatnonzero(size > limit)
-            if size[k] == size[max(k - 2, 0) : k + 3].max()
-            and abs(record[min(k + 2, record.size - 1)] - record[max(k - 2, 0)]) < 0.5 * size[k]  # an edge stays
-            and max(size[max(k - CLOSE, 0) : max(k - 2, 0)].max(initial=0.0), size[k + 3 : k + CLOSE].max(initial=0.0))
-            < 0.25 * size[k]
-        ],
-        dtype=np.intp,
-    )
 
 
 def low_passed(record: Array, rate_hz: float, duration_s: float) -> Array:
@@ -206,7 +178,7 @@ def zero_shift(record: Array, pulse: "Pulse") -> tuple[float, float]:
     return float(rest.mean()) - pulse.baseline, pulse.noise * float(np.sqrt(1.0 / rest.size + 1.0 / before))
 
 
-def _span(y: Array, top: int, level: float) -> tuple[int, int]:
+def span(y: Array, top: int, level: float) -> tuple[int, int]:
     """First and last sample of the run around ``top`` that stays above a level."""
     low = high = top
     while low > 0 and y[low - 1] >= level:
@@ -218,7 +190,7 @@ def _span(y: Array, top: int, level: float) -> tuple[int, int]:
 
 def _crossings(y: Array, top: int, level: float) -> tuple[float, float]:
     """Interpolated places where the pulse crosses a level before and after ``top``, in samples."""
-    low, high = _span(y, top, level)
+    low, high = span(y, top, level)
     start, stop = float(low), float(high)
     if low > 0 and y[low] > y[low - 1]:
         start = low - (y[low] - level) / (y[low] - y[low - 1])

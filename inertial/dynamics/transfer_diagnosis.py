@@ -20,6 +20,10 @@ SEPARATED = 10.0
 """Uncertainties of a point by which rival models must differ at a frequency that is proposed: several of their errors as well."""
 
 
+REACH, HALVINGS = 3.84, 8
+"""Increase of χ² that ends a 95 % interval; steps by which its end is found, to 3 % of the range of a corner."""
+
+
 @dataclass(frozen=True)
 class Failure:
     """A part of the frequency range where the model fails: its share of χ², and whether in magnitude or in phase."""
@@ -165,13 +169,41 @@ def _rivals(points: Points, extended: TransferFit, classes: Sequence[EffectClass
         and name not in extended.effects
         and 2 * len(points.value) > 3 * len(extended.parameters) + 8
     ]
+    price = max(1.0, extended.chi_square / max(extended.dof, 1))
     fits = [fit_transfer(points, effects, extended.known, only_near=True) for effects in models]
+    fits = [_farthest(points, fit, extended.chi_square, REACH * price) for fit in fits]
     for fit in (extended, *fits):
         other = best_of_exchange(points, fit)[1] if "second_order" in fit.effects else None
         if other is not None:
             fits.append(other)
-    price = CLASS_WIDTH * max(1.0, extended.chi_square / max(extended.dof, 1))
-    return tuple(fit for fit in fits if fit.chi_square < extended.chi_square + price)
+    return tuple(fit for fit in fits if fit.chi_square < extended.chi_square + CLASS_WIDTH * price)
+
+
+def _farthest(points: Points, fit: TransferFit, without: float, reach: float) -> TransferFit:
+    """Of a model with a filter that may as well be absent, the fit with the nearest corner that the points do not exclude.
+
+    What such a filter does to the other parameters grows with its delay, and ends where χ² has risen: a covariance at a corner
+    far away does not tell it. A fit whose filter the points determine is left as it is.
+
+    Parameters
+    ----------
+    without : χ² without the filter; reach : increase of it that ends the interval
+    """
+    last = fit.parameters[-1]
+    if not EFFECTS[fit.effects[-1]].in_every_device or fit.chi_square < without - reach:
+        return fit
+    away, near = (last.high, last.low) if last.unit == "Hz" else (last.low, last.high)
+    best = fit
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(away * near))
+        held = fit_transfer(
+            points, fit.effects, fit.known | {last.name: middle}, only_near=True, steps=A_FEW, held=last.name
+        )
+        if held.chi_square < without + reach:
+            away, best = middle, held
+        else:
+            near = middle
+    return best
 
 
 def _error(points: Points, fit: TransferFit) -> float:

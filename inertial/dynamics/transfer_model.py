@@ -21,6 +21,8 @@ PLAIN = Conditions(np.ones(2), np.ones(2), np.array([0.0, 1.0]), np.ones(2))
 """Points at which every effect has its parameters."""
 PREDICTION_STEP = 1e-6
 """Of a coordinate, for the central differences of a prediction: near the cube root of the machine's precision."""
+HELD_WITHIN = 1e-7
+"""Half the range of the logarithm of a parameter that is held: a search needs one."""
 IDENTIFIED_SHARE = 0.2
 """Largest relative standard uncertainty at which a frequency or damping counts as identified."""
 
@@ -177,6 +179,7 @@ def fit_transfer(
     *,
     only_near: bool = False,
     steps: int = TO_THE_END,
+    held: str = "",
 ) -> TransferFit:
     """The best fit of a model over several starts.
 
@@ -186,6 +189,7 @@ def fit_transfer(
     near : values of parameters at which the search starts, by name, as those of a smaller model
     only_near : whether these parameters start there alone: the model describes the points already
     steps : most of the last search; few will do for some of the points that gave ``near``
+    held : a log parameter that stays at its value of ``near``: it has no uncertainty, and costs no degree of freedom
 
     Raises
     ------
@@ -202,6 +206,9 @@ def fit_transfer(
     sign = -1.0 if np.median(np.abs(np.angle(points.value[low_end]))) > 0.5 * np.pi else 1.0
     coordinates, factor_at = Coordinates(parameters), factor_of(effects, conditions)
     bounds = np.append(-np.inf, coordinates.low), np.append(np.inf, coordinates.high)
+    free = np.append(True, [p.name != held for p in parameters])
+    for bound, width in zip(bounds, (-HELD_WITHIN, HELD_WITHIN), strict=True):
+        bound[~free] = np.log((near or {}).get(held, 1.0)) + width
     error = np.concatenate([points.magnitude_error, points.phase_error])
 
     def deviation(x: Array) -> Array:
@@ -235,7 +242,8 @@ def fit_transfer(
         for one in tried[:POLISHED]
     ]
     best = min(done, key=lambda one: one.cost)
-    covariance = np.asarray(np.linalg.pinv(best.jac.T @ best.jac, rcond=1e-15))
+    jacobian = np.where(free, best.jac, 0.0)
+    covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-15))
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     left = residual(best.x)
     return TransferFit(
@@ -246,7 +254,7 @@ def fit_transfer(
         coordinates.values(best.x[1:]),
         errors[1:],
         float(left @ left),
-        len(left) - len(best.x),
+        len(left) - int(np.count_nonzero(free)),
         left,
         covariance,
     )

@@ -49,11 +49,14 @@ class DisturbanceRow(TypedDict):
     """What no noise explains in a channel of a record."""
 
     channel: str
-    kind: Literal["spikes", "loud", "stuck", "jump"]
+    kind: Literal["spikes", "loud", "bursts", "stuck", "jump"]
     start_s: float
     stop_s: Annotated[float, "behind the last sample; of a jump where it is"]
-    count: Annotated[int, "spikes, or samples"]
-    size: Annotated[float, "largest spike, change of the mean or standard deviation, in `unit`; 0 of a stuck output"]
+    count: Annotated[int, "spikes, bursts, or samples"]
+    size: Annotated[
+        float,
+        "largest spike or sample of a burst, change of the mean or standard deviation, in `unit`; 0 of a stuck output",
+    ]
 
 
 class AllanDocument(TypedDict):
@@ -72,7 +75,10 @@ class AllanDocument(TypedDict):
     terms: Annotated[list[NoiseTermRow], "of the overlapping Allan deviation"]
     navigation: Annotated[list[NavigationRow], "empty where the unit is none of acceleration"]
     disturbances: NotRequired[
-        Annotated[list[DisturbanceRow], "their channels have limits alone; of a captured run in `notes`"]
+        Annotated[
+            list[DisturbanceRow],
+            "their channels have limits alone (with bursts where N changes by 2.5 %); of a captured run in `notes`",
+        ]
     ]
     notes: list[str]
 

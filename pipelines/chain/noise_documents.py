@@ -69,10 +69,10 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
         if (text := remark(own, series.unit or "of the output's unit"))
     ]
     notes += [
-        f"{name}: {', '.join(texts) if texts else 'no mixture of the five terms explains the curve'}; the limits are what the "
-        "whole curve allows"
+        f"{name}: {', '.join(texts) if texts else 'no mixture of the five terms explains the curve'}"
+        f"{'' if known else '; the limits are what the whole curve allows'}"
         for name, known, texts in zip(names, explained, told, strict=True)
-        if not known
+        if texts or not known
     ]
     shown, unit, about, model = curve, series.unit, ALLAN, model_deviation(terms, curve.tau)
     if statistic != ALLAN["statistic"]:

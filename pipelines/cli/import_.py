@@ -22,6 +22,7 @@ from pipelines.cli.printing import conclude, error_console, print_table, say, sh
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
+from schemas.tables import ADEQUATE, NOT_JUDGED
 
 PART = "Measure"
 ORDER = 160
@@ -31,6 +32,8 @@ EXAMPLES = (
     "tumbleline import acc.csv --set columns.toml --fit norm",
 )
 
+WAVEFORMS = ("reference", "x", "y", "z")
+"""Channels that make an import of a sweep one of waveforms, not of points."""
 METHODS = ("norm", "plane", "faces", "temperature")
 
 
@@ -99,7 +102,8 @@ def command(
         str,
         option(
             "--procedure NAME",
-            "Dynamic test: the transfer function of a sweep, or with --map reference=… the waveforms of a procedure.",
+            "Dynamic test: the points of a sweep (--map frequency=…,magnitude=…,phase=…), or with --map reference=… the "
+            "waveforms of a procedure.",
         ),
     ] = "",
     effects: Annotated[
@@ -113,7 +117,8 @@ def command(
     """Import recordings of other systems into the archive: a raw record and its dwells in the exchange format.
 
     Columns are named, or numbered from 1. Nothing is guessed: what neither the file nor its numbers show must be given. Exit
-    status 1: the requested fit is not adequate, or cannot be judged.
+    status 1: the requested fit, or the model of a test, is not adequate or cannot be judged, or a figure of a test that the
+    files hold is not determined.
     """
     from pipelines.importers import limited
 
@@ -122,13 +127,14 @@ def command(
 
     file, given = _settings(setting)
     listed, stated_units = ",".join(columns or ()), ",".join(unit_of or ())
-    if procedure and (columns or procedure != "sweep"):
-        if other := sorted(given.keys() - {"group"}):
-            raise WrongUse(f"import: --set {other[0]} is for records at rest, --procedure is given; leave it out")
+    waveforms = procedure != "sweep" or any(channel in mapped.pairs(listed, "--map") for channel in WAVEFORMS)
+    if procedure and (other := sorted(given.keys() - ({"group"} if waveforms else set()))):
+        raise WrongUse(f"import: --set {other[0]} is for records at rest, --procedure is given; leave it out")
+    if procedure and waveforms:
         layout = (listed, stated_units, rate, given.get("group", ""))
         _waveforms(files, procedure, file, units, layout, archive, as_json=as_json)
     if procedure:
-        _transfer(files, units, effects, archive, as_json=as_json)
+        _transfer(files, units, effects, (listed, stated_units, file), archive, as_json=as_json)
     from pipelines.diagnosis.import_document import import_document
 
     keys: dict[str, Any] = mapped.from_file(file) if file else {}
@@ -168,14 +174,27 @@ def _settings(given: list[str] | None) -> tuple[Path | None, dict[str, Any]]:
     return (Path(files[0]) if files else None), keys
 
 
-def _transfer(files: list[Path], unit: str, effects: str, archive: str | None, *, as_json: bool) -> NoReturn:
-    """Judge, store and print transfer functions; a part failed where one is not adequate or cannot be judged."""
+def _transfer(
+    files: list[Path],
+    unit: str,
+    effects: str,
+    stated: tuple[str, str, Path | None],
+    archive: str | None,
+    *,
+    as_json: bool,
+) -> NoReturn:
+    """Judge, store and print transfer functions; a part failed where one is not adequate or cannot be judged.
+
+    stated : columns and units as the options have them, and the file of --set
+    """
     from pipelines.importers.transfer import import_transfer
+    from pipelines.importers.transfer_columns import stated_layout
 
     if not unit:
         raise WrongUse("import: no serial number, a transfer function needs one; add --units SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
-    imported = [import_transfer(path, unit, model, archive) for path in files]
+    layout = stated_layout(*stated)
+    imported = [import_transfer(path, unit, model, archive, layout) for path in files]
     document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
     passed = all(one["adequate"] is True for one in imported)
     conclude(document, lambda _: _print_transfers(imported), as_json=as_json, passed=passed)
@@ -191,7 +210,9 @@ def _waveforms(
     *,
     as_json: bool,
 ) -> NoReturn:
-    """Reduce, keep and print the recordings of one unit; a part failed where a figure is not determined.
+    """Reduce, keep and print the recordings of one unit.
+
+    A part failed where the model is not adequate, or a figure that the recordings hold is not determined.
 
     stated : columns and units as the options have them, rate in Hz, group
     """
@@ -203,7 +224,8 @@ def _waveforms(
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
     imported = import_waveforms(paths, procedure, part, unit, layout, archive)
-    passed = all(figure["identified"] for figure in imported["figures"])
+    held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
+    passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
     conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
 
 
@@ -224,13 +246,17 @@ def _print_waveforms(imported: Mapping[str, Any]) -> None:
             short(figure["value"]),
             short(figure["uncertainty"]),
             figure["unit"],
-            figure["note"],
         ]
         for figure in imported["figures"]
+        if figure["identified"]
     ]
-    print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
+    if rows:
+        print_table(["figure", "axis", "value", "standard uncertainty", "unit"], rows, whole=2)
     for line in imported["text"]:
         say(f"  {line}")
+    if imported["verdict"]:
+        adequate = None if imported["verdict"] == NOT_JUDGED else imported["verdict"] == ADEQUATE
+        print_verdict_of_fit(adequate, "the model does not describe these recordings")
 
 
 def _print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: object, *, list_dwells: bool) -> None:

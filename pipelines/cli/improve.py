@@ -98,6 +98,7 @@ def command(
 
     reading = options.settings(setting, options.READING, "improve")
     add_effects(effect_file)
+    target = _target(model, output)
     recording, data = None, sources[0]
     if runs := [source for source in sources if len(sources) > 1 and not is_file(source)]:
         raise WrongUse(
@@ -109,7 +110,6 @@ def command(
     data = data if recording is None else recording["run"]  # a table of dwells is read as it is
     yes = yes or (recording is not None and not attended())
     judged = judged_effects(data, archive, effects, model, "improve")
-    target = _target(model, output)
     dwells, history, again, again_history = both_runs(data, temperatures, fresh, fresh_temperatures, archive)
     dwells, _ = without_dwells(dwells, leave_out)
     tables = ImprovedTables(dwells, history, again, again_history)

@@ -12,7 +12,7 @@ from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom
 from inertial.fits.norm_noise import RUN_PER_K
 from inertial.state import T_REFERENCE
-from inertial.uncertainty.rounding import equal
+from inertial.uncertainty.rounding import equal, rounded
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.diagnosis.imported_faces import six_faces
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
@@ -214,10 +214,26 @@ def _axis_line(done: FittedNorms, spread: dict[str, Array], place: tuple[int, in
     record, long = (COVERAGE * float(spread[name][u, k]) * level for name in ("bias_record_u_ug", "bias_long_u_ug"))
     whose = f"{done.measured.units[u]} " if len(done.measured.units) > 1 else ""
     later = f"± {long:.2g} over the next day" if np.isfinite(long) else "over the next day not known"
+    own = done.fit.fit
+    errors = COVERAGE * np.sqrt(np.diagonal(own.covariance[u, k]))
+    value = {name: (own.coefficients[u, k, j], errors[j]) for j, (_, name) in enumerate(own.names[k])}
+    scale = _stated(np.array([done.scale[u, k], value.get("K1", (0.0, 0.0))[1]]) / STANDARD_GRAVITY_M_S2)
+    across = [
+        f"{other} {_stated(1e3 * np.array(value[name]) / done.scale[u, k])}"
+        for other in AXES
+        if (name := f"K{AXES[k]}{other}") in value
+        and value[name][1] > 0.0  # the other three are 0 by the choice of the axes
+    ]
+    turned = f", misalignment {', '.join(across)} mrad" if across else ""
     return (
         f"{whose}{AXES[k]}: bias {_bias(done)[u, k]:.7g} ± {record:.2g} {unit} over the record ({later}; k = {COVERAGE:g}), "
-        f"scale {float(done.scale[u, k]) / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
+        f"scale {scale} {unit} per m/s²{turned}"
     )
+
+
+def _stated(value: Array) -> str:
+    """A value and its U (2,) as they are written."""
+    return " ± ".join(rounded(float(value[0]), float(value[1]))) if value[1] > 0.0 else f"{value[0]:.6g}"
 
 
 METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {

@@ -133,6 +133,7 @@ class WaveformFigure(TypedDict):
     uncertainty: Annotated[float | None, "standard uncertainty, in `unit`"]
     unit: str
     identified: bool
+    measured: Annotated[bool, "false: the files cannot hold it; `note` says what would give it"]
     note: str
 
 
@@ -143,6 +144,7 @@ class WaveformImport(TypedDict):
     unit: str
     procedure: str
     records: int
+    verdict: Annotated[str, "on the model of the test: adequate, not adequate, not judged; empty: it has none"]
     figures: list[WaveformFigure]
     text: list[str]
 

@@ -3,65 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from inertial.dynamics.missing_effects import adequate
 from inertial.dynamics.transfer_diagnosis import diagnose_transfer
-from inertial.dynamics.transfer_effects import EFFECTS, Conditions
-from inertial.dynamics.transfer_model import Points
+from inertial.dynamics.transfer_effects import EFFECTS
+from inertial.dynamics.transfer_model import Points, fit_transfer
 from inertial.errors import InertialError
 from pipelines.importers import files
 from pipelines.importers.documents import TransferFailure, TransferImport, TransferParameter
 from pipelines.importers.keep import keep_tables, lot_of_import
-from pipelines.importers.values import finite_column
+from pipelines.importers.transfer_columns import PointsLayout, transfer_points
 from pipelines.procedures import procedure_tables
 from pipelines.procedures.figures import Finding, Outcome
-from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text
+from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text, model_texts
 from schemas.errors import DataRejected, WrongUse, did_you_mean
-
-NEEDED = ("frequency_hz", "magnitude", "phase_deg", "magnitude_uncertainty_percent", "phase_uncertainty_deg")
-OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan, "pressure_hPa": np.nan}
-FEWEST = 8
-
-
-def transfer_points(table: pd.DataFrame, name: str) -> Points:
-    """The points of a table with the columns of :data:`NEEDED`, each with its unit in its name.
-
-    Raises
-    ------
-    DataRejected
-        A column is missing, a value is not a finite number, or there are fewer than eight points.
-    """
-    missing = [one for one in NEEDED if one not in table.columns]
-    if missing:
-        found = ", ".join(map(str, table.columns)) or "none"
-        raise DataRejected(
-            f"{name}: column {', '.join(missing)} is missing, found {found}; a transfer function needs its units in the "
-            "names of its columns; rename them"
-        )
-    columns: dict[str, Any] = {one: np.full(len(table), usual) for one, usual in OPTIONAL.items()}
-    given = [one for one in (*NEEDED, *OPTIONAL) if one in table.columns]
-    columns |= {one: finite_column(table, one, name, "correct the row") for one in given}
-    for one in ("frequency_hz", "magnitude", "magnitude_uncertainty_percent", "phase_uncertainty_deg", "pressure_hPa"):
-        if one in given and not np.all(columns[one] > 0.0):
-            row = int(np.flatnonzero(columns[one] <= 0.0)[0]) + 1
-            raise DataRejected(f"{name}: row {row}, column {one}: a value above 0 is needed; correct the row")
-    if len(table) < FEWEST:
-        raise DataRejected(f"{name}: {len(table)} points, at least {FEWEST} are needed; measure more frequencies")
-    conditions = Conditions(columns["frequency_hz"], *(columns[one] for one in OPTIONAL))
-    value = columns["magnitude"] * np.exp(1j * np.radians(columns["phase_deg"]))
-    error = 1e-2 * columns["magnitude_uncertainty_percent"], np.radians(columns["phase_uncertainty_deg"])
-    return Points(conditions, value, *error)
 
 
 def import_transfer(
-    path: Path, unit: str, effects: Sequence[str] = ("second_order", "delay"), archive: str | None = None
+    path: Path,
+    unit: str,
+    effects: Sequence[str] = ("second_order", "delay"),
+    archive: str | None = None,
+    layout: PointsLayout | None = None,
 ) -> TransferImport:
     """The diagnosis of a transfer function in a file; points, findings and source are stored as a run of the archive.
+
+    Parameters
+    ----------
+    layout : what the user states of its columns
 
     Raises
     ------
@@ -73,8 +47,8 @@ def import_transfer(
     for name in effects:
         if name not in EFFECTS:
             raise WrongUse(f"import: no effect '{name}' of transfer functions; {did_you_mean(name, EFFECTS)}")
-    table, source = files.read(path)
-    points = transfer_points(table, path.name)
+    content, source = files.read_content(path)
+    points, recognised = transfer_points(content, path.name, layout or PointsLayout())
     try:
         diagnosis = diagnose_transfer(points, effects)
     except InertialError as problem:
@@ -88,8 +62,16 @@ def import_transfer(
             "value": p.value, "uncertainty": p.uncertainty, "low": p.low, "high": p.high, "unit": unit_of,
             "identified": p.identified,
         }  # fmt: skip
-    text = diagnosis_text(diagnosis)
+    text = [
+        *([("columns", recognised)] if recognised else []),
+        *diagnosis_text(diagnosis),
+        *model_texts(diagnosis, points),
+    ]
+    if diagnosis.adequate is False and adequate(fit_transfer(_as_radians(points), effects)):
+        text.append(("phase", "taken as radians the same points agree with the model; add --unit-of phase=rad"))
     stated = {"procedure": "sweep", "effects": list(effects), "unit": unit}
+    if layout is not None:
+        stated |= {name: dict(value) for name, value in vars(layout).items() if value}
     about = {"name": f"transfer function of {unit}", "source": source.as_dict(), "lot": lot_of_import([unit])}
     tables = _tables(points, unit, text)
     run = keep_tables("import of a transfer function", source.sha256, stated, about, tables, archive)
@@ -115,6 +97,13 @@ def import_transfer(
         "next_hz": list(diagnosis.next_hz),
         "text": [f"{subject}: {one}" for subject, one in text],
     }
+
+
+def _as_radians(points: Points) -> Points:
+    """The points of phases that were radians where degrees were read."""
+    angle = np.degrees(np.angle(points.value))
+    turned = np.asarray(np.abs(points.value) * np.exp(1j * angle), dtype=np.complex128)
+    return replace(points, value=turned, phase_error=np.degrees(points.phase_error))
 
 
 def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[str, pd.DataFrame]:

@@ -21,7 +21,7 @@ from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.values import finite_column
 from pipelines.procedures import PROCEDURES, procedure_tables
 from pipelines.procedures.base import FromWaveforms, NominalScale
-from pipelines.procedures.figures import Finding, Outcome
+from pipelines.procedures.figures import FigureValue, Finding, Outcome
 from pipelines.procedures.recorded import (
     REFERENCE,
     Device,
@@ -111,13 +111,17 @@ def import_waveforms(
         mapped = [axis for axis in AXES if axis in layout.columns]
         points = points[points["axis"].isin(mapped)].reset_index(drop=True)
         outcome = one.evaluate(own, points, device)
+        verdict = one.verdict(own, points)
     except InertialError as problem:
         raise DataRejected(f"{paths[0].name}: {problem}") from None
     values = outcome.figures.get(unit, [])
     texts = [(f.subject, f.text) for f in outcome.findings]
+    texts += _without_value(values)
     texts += [("file", remark) for remark in recordings[0].remarks]
     if not np.isfinite(full_scale):
-        texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --set"))
+        texts.append(
+            ("not judged", "clipping at the end of the range: full_scale is not given; add it to the file of --set")
+        )
     content |= own.model_dump(include={"duration_ms", "before_ms"} - set(content))
     about = {
         "name": f"{one.title} of {unit}, recorded elsewhere",
@@ -137,7 +141,7 @@ def import_waveforms(
         {
             "figure": f.figure, "axis": f.axis, "value": f.value if f.identified and np.isfinite(f.value) else None,
             "uncertainty": f.uncertainty if f.identified and np.isfinite(f.uncertainty) else None, "unit": units[f.figure],
-            "identified": bool(f.identified and np.isfinite(f.value)), "note": f.note,
+            "identified": bool(f.identified and np.isfinite(f.value)), "measured": f.measured, "note": f.note,
         }
         for f in values
     ]  # fmt: skip
@@ -146,9 +150,20 @@ def import_waveforms(
         "unit": unit,
         "procedure": procedure,
         "records": len(records),
+        "verdict": verdict,
         "figures": figures,
         "text": [f"{subject}: {text}" for subject, text in texts],
     }
+
+
+def _without_value(values: Sequence[FigureValue]) -> list[tuple[str, str]]:
+    """The figures without a value, those of one reason together: what the files cannot hold, and what they do not determine."""
+    of_reason: dict[tuple[str, str], list[str]] = {}
+    for one in values:
+        if not (one.identified and np.isfinite(one.value)):
+            subject = "not determined" if one.measured else "not measured"
+            of_reason.setdefault((subject, one.note), []).append(one.figure)
+    return [(subject, f"{', '.join(names)}: {note}") for (subject, note), names in of_reason.items()]
 
 
 def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[str, Any], float]:

@@ -184,6 +184,10 @@ class FromWaveforms(Evaluated):
         """The part with what recordings made elsewhere show and the user has not stated."""
         return part
 
+    def verdict(self, part: Any, rows: pd.DataFrame) -> str:
+        """Verdict on the model of one unit's points, of :data:`schemas.tables.VERDICTS`; empty where they have no model."""
+        return ""
+
     @abstractmethod
     def setting_of(self, part: Any, reference: UnitRecord) -> dict[str, float]:
         """The setting of a step that was recorded elsewhere, from its reference channel."""

@@ -36,7 +36,8 @@ class FigureValue:
     """A figure of one unit and axis.
 
     ``low`` and ``high`` are the ends of a 95 % interval. Where ``identified`` is False the value passes no limit, and ``note``
-    states why, and a measurement that determines it. A standard deviation has ``dof`` degrees of freedom, nan for other figures,
+    states why, and a measurement that determines it; where ``measured`` is False the records cannot hold
+    it. A standard deviation has ``dof`` degrees of freedom, nan for other figures,
     and ``removed`` is the known part that was taken out of it; see :class:`inertial.uncertainty.degrees.DeviationLaw`.
     """
 
@@ -50,6 +51,7 @@ class FigureValue:
     note: str = ""
     dof: float = float("nan")
     removed: float = 0.0
+    measured: bool = True
 
     @classmethod
     def not_determined(
@@ -57,6 +59,11 @@ class FigureValue:
     ) -> Self:
         """A figure without a value, with the reason."""
         return cls(figure, axis, float("nan"), float("nan"), low, high, identified=False, note=note)
+
+    @classmethod
+    def not_measured(cls, figure: str, axis: str, note: str) -> Self:
+        """A figure that the records cannot hold, with what would give it."""
+        return replace(cls.not_determined(figure, axis, note), measured=False)
 
 
 Texts = Sequence[tuple[str, str]]

@@ -13,7 +13,7 @@ from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
-from pipelines.procedures import shock_records
+from pipelines.procedures import shock_figures, shock_records
 from pipelines.procedures.base import (
     Compares,
     FromWaveforms,
@@ -105,7 +105,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         FigureSpec(
             "shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"
         ),
-        *shock_records.OF_PULSE,
+        *shock_figures.OF_PULSE,
     )
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -166,13 +166,14 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
             direction = one.record.step.setting["direction"]
             alone = REFERENCE not in one.record.samples
             in_g = UnitRecord(one.own.time, one.own.output / scale)
-            pair = shock_records.filtered_pair(
-                in_g if alone else one.record.samples[REFERENCE], one.own, axis, scale[axis], duration
-            )
-            both = [one.own] if alone else [one.own, one.record.samples[REFERENCE]]
-            lone_s = shock_records.lone_sample(both, axis, duration)
-            of_shock = shock_records.rows_of(
-                one.number, direction, one.own.output[:, axis], pair, before_s, device, alone=alone, lone_s=lone_s
+            drive = in_g if alone else one.record.samples[REFERENCE]
+            end_s, earlier, others = shock_records.single_pulse(one.number, drive, axis, duration)
+            own, drive = (shock_records.until(wave, end_s) for wave in (one.own, drive))
+            pair = shock_records.filtered_pair(drive, own, axis, scale[axis], duration)
+            lone_s = shock_records.lone_sample([own] if alone else [own, drive], axis, duration)
+            found = shock_records.Found(alone, lone_s, earlier)
+            of_shock = others + shock_records.rows_of(
+                one.number, direction, (own, drive), axis, pair, (before_s, duration), device, found
             )
             names = ("unit",) if alone else ("reference", "unit")
             if not alone:
@@ -191,18 +192,22 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
             texts.append(("survival", "the output is constant after the shocks: the unit has not survived"))
         pulse = rows[rows["series"] == "pulse"]
-        texts += shock_records.texts_of(reference, pulse)
-        apart = shock_records.no_comparison(good, reference, pulse)
-        if len(good) and not apart:
+        texts += shock_figures.texts_of(reference, pulse, rows[rows["series"] == "other"])
+        apart = shock_figures.no_comparison(good, reference, pulse)
+        if shock_figures.comparable(rows):
             texts += shock_records.diagnosis_text(rows, part)
-        compared = shock_records.ratio_figures(part, ratio, good, apart)
-        return [*compared, bias_shift(bias), *shock_records.pulse_figures(part.axis, pulse, ratio)], texts
+        compared = shock_figures.ratio_figures(part, ratio, good, apart)
+        return [*compared, bias_shift(bias), *shock_figures.pulse_figures(part.axis, pulse, ratio)], texts
 
     def compared(
         self, part: ShockPart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
     ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
         """Sensitivity by comparison, and the figures that it bears out; none without a comparison."""
         return compared_results(part, figures, int((rows["series"] == "ratio").sum())), []
+
+    def verdict(self, part: ShockPart, rows: pd.DataFrame) -> str:
+        """The verdict on the comparison of the waveforms; none without a comparison."""
+        return shock_records.verdict(rows, part) if (rows["series"] == "compared").any() else ""
 
     def chart(self, part: ShockPart, points: pd.DataFrame) -> Chart:
         """First shock of reference and unit, and their shock response spectra."""
@@ -260,13 +265,14 @@ def bias_shift(bias: pd.DataFrame) -> FigureValue:
         note = "the output is constant after the shocks: the unit has not survived" if stuck else ""
         shifts.append(FigureValue("shock_bias_shift_ug", str(axis), value, error, identified=not stuck, note=note))
     if not shifts:
-        return FigureValue.not_determined("shock_bias_shift_ug", "*", "no bias before or after")
+        note = "no record at rest before and after the shocks; a recipe with shocks takes both"
+        return FigureValue.not_measured("shock_bias_shift_ug", "*", note)
     return worst(shifts)
 
 
 RELATIVE = ("shock_undershoot_percent", "shock_zero_shift_percent", "shock_duration_ms", "shock_return_ms")
 """Figures that the scale of the unit does not enter."""
-UNIT_OF = {spec.name: spec.unit for spec in shock_records.OF_PULSE} | {"shock_undershoot_percent": "%"}
+UNIT_OF = {spec.name: spec.unit for spec in shock_figures.OF_PULSE} | {"shock_undershoot_percent": "%"}
 
 
 def compared_results(part: ShockPart, figures: Mapping[str, FigureValue], shocks: int) -> list[ComparedResult]:

@@ -2,20 +2,21 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 
-from inertial.dynamics import pulses
+from inertial.dynamics import pulse_faults, pulses
 from inertial.dynamics.pulses import Pulse
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
-from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
 from inertial.record_faults import clipped as at_extreme
-from pipelines.procedures.figures import FigureSpec, FigureValue, diagnosis_texts, with_uncertainty
+from pipelines.procedures import shock_figures
+from pipelines.procedures.compared import verdict_word
+from pipelines.procedures.figures import diagnosis_texts, with_uncertainty
 from pipelines.procedures.recorded import Device, UnitRecord, numbers, point_rows
 from schemas.units import STANDARD_GRAVITY_M_S2
 
@@ -74,14 +75,51 @@ def waves(number: int, pair: Pair, direction: float, part: Any, noise_g: float) 
     )
 
 
+def until(record: UnitRecord, end_s: float) -> UnitRecord:
+    """A record up to a time from its begin, s."""
+    count = min(len(record.time), max(int(end_s * record.rate_hz), 1)) if np.isfinite(end_s) else len(record.time)
+    return UnitRecord(record.time[:count], record.output[:count])
+
+
+def single_pulse(
+    number: int, drive: UnitRecord, axis: int, duration: float
+) -> tuple[float, bool, list[dict[str, Any]]]:
+    """Time before the pulse behind the largest, s, whether one is before the largest, and the rows of both.
+
+    A rebound behind the pulse is left out; one before it lies in the baseline of its figures.
+    """
+    earlier, later = pulse_faults.other_pulses(drive.output[:, axis], drive.rate_hz, duration)
+    rows = [
+        {
+            "point": MOST_SAMPLES * number + k, "series": "other", "setting": one.at_s, "value": one.peak, "shock": float(number),
+        }
+        for k, one in enumerate((*earlier, *later))
+    ]  # fmt: skip
+    end_s = later[0].begins_s - 0.5 * duration if later else np.inf
+    return end_s, bool(earlier), rows
+
+
 def lone_sample(records: Sequence[UnitRecord], axis: int, duration: float) -> float:
     """Time of the first sample of the records that departs alone, s from their begin; nan for none."""
     found = [
         float(one.time[k] - one.time[0])
         for one in records
-        for k in pulses.lone_samples(one.output[:, axis], one.rate_hz, duration)[:1]
+        for k in pulse_faults.lone_samples(one.output[:, axis], one.rate_hz, duration)[:1]
     ]
     return min(found, default=np.nan)
+
+
+def verdict(rows: pd.DataFrame, part: Any) -> str:
+    """The verdict on the comparison; not judged where the pulses cannot be compared."""
+    diagnosis = None
+    if shock_figures.comparable(rows):
+        with suppress(NotIdentified):
+            diagnosis = judged(rows, part)
+    return verdict_word(None if diagnosis is None else diagnosis.adequate)
+
+
+_last_judged: dict[bytes, ShockDiagnosis] = {}
+"""The diagnosis that was made last: its sentences and its verdict are asked for one after the other."""
 
 
 def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
@@ -95,7 +133,15 @@ def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
         reference, unit, error = numbers(own, "reference_g", "value", "uncertainty")
         shocks.append(Waves(reference, unit, error))
         before = -float(own["setting"].iloc[0])
-    return diagnose_shock(ShockRecord(rate, duration, before, tuple(shocks)), part.effects) if shocks else None
+    if not shocks:
+        return None
+    key = repr((part.effects, rate, duration, before)).encode()
+    key += b"".join(array.tobytes() for one in shocks for array in (one.reference, one.unit, one.error))
+    if key not in _last_judged:
+        made = diagnose_shock(ShockRecord(rate, duration, before, tuple(shocks)), part.effects)
+        _last_judged.clear()
+        _last_judged[key] = made
+    return _last_judged[key]
 
 
 def diagnosis_text(rows: pd.DataFrame, part: Any) -> list[tuple[str, str]]:
@@ -145,53 +191,49 @@ def curves(pair: Pair, names: Sequence[str], duration: float, before_s: float) -
     return rows
 
 
-OF_PULSE = (
-    FigureSpec("shock_peak_g", "g", "peak of the unit's pulse above its baseline; mean of the shocks", one_axis=True),
-    FigureSpec("shock_duration_ms", "ms", "duration of the half sine with the unit's 10 % points", one_axis=True),
-    FigureSpec("shock_velocity_m_s", "m/s", "velocity change, the integral over the unit's pulse", one_axis=True),
-    FigureSpec(
-        "shock_return_ms", "ms", "after the pulse, until the output stays within 2 % of the peak of where it ends"
-    ),
-    FigureSpec("shock_zero_shift_percent", "%", "output at the end of the record minus the baseline, of the peak"),
-)
-_COLUMNS = ("value", "duration_s", "velocity_m_s", "return_s", "zero_shift_percent")
-_ERRORS = ("uncertainty", "duration_error_s", "velocity_error_m_s", "return_error_s", "zero_shift_error_percent")
-_FACTORS = (1.0, 1e3, 1.0, 1e3, 1.0)
-APART = 0.3
-"""Departure of peak or duration from the reference's above which the two were not mounted on each other."""
+class Found(NamedTuple):
+    """Whether a shock has no reference, time of a sample that departs alone (nan: none), whether a pulse precedes the largest."""
+
+    alone: bool
+    lone_s: float
+    earlier: bool
 
 
 def rows_of(
     number: int,
     direction: float,
-    raw: np.ndarray,
+    channels: tuple[UnitRecord, UnitRecord],
+    axis: int,
     pair: Pair,
-    before_s: float,
+    times: tuple[float, float],
     device: Device,
-    *,
-    alone: bool = False,
-    lone_s: float = np.nan,
+    found: Found,
 ) -> list[dict[str, Any]]:
     """The pulses of reference and unit and their ratio; no value where the unit shows no pulse or clips, or a sample is off.
 
     Parameters
     ----------
-    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass
-    alone : no reference was recorded; the first of the pair is not looked at
-    lone_s : time of a sample of either that departs alone; nan for none
+    channels : unit and reference as recorded; pair : reference and unit in g behind their low-pass
+    times : before the pulse, and its duration, s
+    found : in the records; without a reference the first of the pair is not looked at
     """
-    (reference, rate), (unit, unit_rate) = pair
+    alone, lone_s, earlier = found
+    ((reference, rate), (unit, unit_rate)), before_s = pair, times[0]
     about = {"point": number, "setting": direction}
     rows: list[dict[str, Any]] = []
     drive = None if alone else pulses.measured_pulse(reference, rate, before_s=before_s)
     if drive is not None:
         rows.append(about | {"series": "reference"} | _columns(drive, reference, rate))
+    raw = channels[0].output[:, axis]
     still = np.median(raw[: int(before_s * unit_rate)])
     # a rail of the unit itself, below the range of the data sheet, shows as an extreme at which it stands still
     clipped = device.at_end(raw) + device.at_end(raw - still) + at_extreme(raw)[2] > 0
+    flat = [_flat(one, axis, times) for one in channels[: 1 if alone else 2]]
+    if len(set(flat)) > 1 or (alone and flat[0]):  # a machine may make a flat pulse, two channels do not clip alike
+        clipped = shock_figures.CLIPS.index("the output" if flat[0] else "the reference")
     ratio = error = under = noise = np.nan
     with suppress(NotIdentified):
-        if not clipped and np.isnan(lone_s):
+        if not clipped and np.isnan(lone_s) and not earlier:
             answer = pulses.measured_pulse(unit, unit_rate, before_s=before_s)
             noise = answer.noise
             rows.append(about | {"series": "pulse"} | _columns(answer, unit, unit_rate))
@@ -200,7 +242,17 @@ def rows_of(
                 error = abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
                 under = 100.0 * (answer.undershoot - drive.undershoot)
     compared = {"value": ratio, "uncertainty": error, "undershoot_percent": under, "noise_g": noise, "lone_s": lone_s}
-    return [*rows, about | {"series": "ratio", "clipped": float(clipped), "alone": float(alone)} | compared]
+    flags = {"clipped": float(clipped), "alone": float(alone), "earlier": float(earlier)}
+    return [*rows, about | {"series": "ratio"} | flags | compared]
+
+
+def _flat(record: UnitRecord, axis: int, times: tuple[float, float]) -> bool:
+    """Whether the top of a channel's pulse is cut off flat."""
+    wave, (before_s, duration) = record.output[:, axis], times
+    quiet = wave[: int(before_s * record.rate_hz)]
+    if quiet.size < 2:
+        return False
+    return pulse_faults.flat_top(wave, record.rate_hz, duration, float(quiet.std(ddof=1)), float(quiet.mean())) > 0
 
 
 def _columns(pulse: Pulse, wave: np.ndarray, rate_hz: float) -> dict[str, float]:
@@ -219,94 +271,3 @@ def _columns(pulse: Pulse, wave: np.ndarray, rate_hz: float) -> dict[str, float]
         "zero_shift_percent": 100.0 * shift / pulse.peak,
         "zero_shift_error_percent": 100.0 * error / abs(pulse.peak),
     }
-
-
-def texts_of(reference: pd.DataFrame, pulse: pd.DataFrame) -> list[tuple[str, str]]:
-    """Peak, duration and velocity change of the reference, or of the unit where it was recorded alone."""
-    own, name = (reference, "reference") if len(reference) else (pulse, "unit")
-    if own.empty:
-        return []
-    peak, lasting = float(own["value"].abs().mean()), float(own["duration_s"].mean())
-    text = (
-        f"{name} {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change {float(own['velocity_m_s'].abs().mean()):.3g} m/s "
-        f"(half sine: {pulses.velocity_change(peak, lasting):.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
-    )
-    return [("pulse", text)]
-
-
-def no_comparison(good: pd.DataFrame, reference: pd.DataFrame, pulse: pd.DataFrame) -> str:
-    """Why the pulses of unit and reference are not those of two sensors on each other; empty where they may be."""
-    if good.empty or reference.empty or pulse.empty:
-        return ""
-    peak = float(good["value"].mean())
-    lasting = float(pulse["duration_s"].mean()) / float(reference["duration_s"].mean())
-    for what, ratio in (("the peak", peak), ("the duration", lasting)):
-        if not abs(ratio - 1.0) < APART:
-            return (
-                f"{what} is {ratio:.3g} times that of the reference: two places of a structure are no comparison; mount the unit "
-                "on the reference, or check the scale and the polarity"
-            )
-    return ""
-
-
-def ratio_figures(part: Any, ratio: pd.DataFrame, good: pd.DataFrame, apart: str) -> list[FigureValue]:
-    """Sensitivity and undershoot by comparison; ``apart``: why there is no comparison."""
-    names = ("shock_sensitivity_percent", "shock_undershoot_percent")
-    note = apart or _without(ratio, len(good))
-    if note:
-        return [FigureValue.not_determined(name, part.axis, note) for name in names]
-    _, value, each = numbers(good)
-    scatter = float(value.std(ddof=1) / np.sqrt(value.size)) if value.size > 2 else 0.0
-    spread = max(scatter, float(np.sqrt(np.mean(each**2)) / np.sqrt(value.size)))
-    under = good["undershoot_percent"].to_numpy(dtype=float)
-    floor = 100.0 * float(good["noise_g"].mean()) / part.peak_g / np.sqrt(under.size)
-    # shocks differ in duration, and so in undershoot: of a few, their scatter is itself uncertain
-    scatter = float(under.std(ddof=1) / np.sqrt(under.size)) if under.size > 1 else 0.0
-    error = float(np.hypot(100.0 * spread, part.reference_percent))
-    under_error = stated_error(floor**2 + scatter**2, 1.0, scatter**2 * np.sqrt(2.0 / max(1, under.size - 1)))
-    return [
-        FigureValue(names[0], part.axis, float(100.0 * (value.mean() - 1.0)), error),
-        FigureValue(names[1], part.axis, float(under.mean()), under_error),
-    ]
-
-
-def _without(ratio: pd.DataFrame, good: int) -> str:
-    """Why there is no comparison; empty where every shock has one."""
-    if ratio.empty:
-        return "0 of 0 shocks show no pulse; check cable and mounting"
-    clipped = int((ratio["clipped"] > 0.0).sum())
-    if clipped:
-        return f"{clipped} of {len(ratio)} shocks clip the output; lower the peak, or choose a wider range"
-    lone = ratio["lone_s"].dropna() if "lone_s" in ratio else ratio["value"].iloc[:0]
-    if len(lone):
-        return (
-            f"{len(lone)} of {len(ratio)} shocks {'has' if len(lone) == 1 else 'have'} a sample that departs alone, at "
-            f"{lone.iloc[0]:.6g} s of its record; check the data line, shock again"
-        )
-    if "alone" in ratio and bool((ratio["alone"] > 0.0).any()):
-        return "recorded without a reference, which a comparison needs; record one beside the unit"
-    return (
-        f"{len(ratio) - good} of {len(ratio)} shocks show no pulse; check cable and mounting"
-        if good < len(ratio)
-        else ""
-    )
-
-
-def pulse_figures(axis: str, pulse: pd.DataFrame, ratio: pd.DataFrame) -> list[FigureValue]:
-    """Peak, duration, velocity change, return and zero shift of the unit, means of the shocks; polarity apart."""
-    if pulse.empty or len(pulse) < len(ratio):
-        note = _without(ratio, len(pulse)) or "0 shocks show a pulse; check cable and mounting"
-        return [FigureValue.not_determined(spec.name, axis, note) for spec in OF_PULSE]
-    figures: list[FigureValue] = []
-    for spec, column, of_error, factor in zip(OF_PULSE, _COLUMNS, _ERRORS, _FACTORS, strict=True):
-        value = factor * numbers(pulse, column)[0]
-        value = np.abs(value) if column == "value" else value
-        if not np.isfinite(value).all():
-            note = "the output does not come to rest; record longer"
-            figures.append(FigureValue.not_determined(spec.name, axis, note))
-            continue
-        each = factor * numbers(pulse, of_error)[0]
-        scatter = float(value.std(ddof=1)) if value.size > 1 else 0.0
-        error = float(np.hypot(scatter, np.sqrt(np.mean(each**2)))) / np.sqrt(value.size)
-        figures.append(FigureValue(spec.name, axis, float(value.mean()), error))
-    return figures

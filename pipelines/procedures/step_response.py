@@ -7,7 +7,9 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from inertial.dynamics.pulses import lone_samples
+from inertial.arrays import Array
+from inertial.dynamics.pulse_faults import CLOSE, flat_top, lone_samples
+from inertial.dynamics.pulses import span
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
@@ -32,6 +34,7 @@ SETTLING, OVERSHOOT, RISE = "step_settling_ms", "step_overshoot_percent", "step_
 BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
 FINAL_SHARE = 0.3  # of the step's duration, at its end: the final value
 BINS = 2  # points of the averaged response for each sample interval
+MOST_EDGES = 16  # of the drive in a record: noise alone crosses its middle at every other sample
 WIDTHS = (3.0, 1.9, 0.8)  # axes that agree still show one above the other
 
 
@@ -186,13 +189,16 @@ FAULTS: Mapping[int, str] = {
 
 
 def _edge(reference: UnitRecord) -> float:
-    """Time of the rising edge of the drive, s from the beginning of the record."""
+    """Time of the first edge of the drive, rising or falling, s from the beginning of the record."""
     drive = reference.output[:, 0]
     half = 0.5 * (drive.min() + drive.max())
-    above = int(np.argmax(drive > half))
-    if above == 0:
-        msg = "step: no rising edge in the recorded drive; check the trigger"
+    crossings = np.flatnonzero(np.diff(drive > half)) + 1
+    if not 0 < crossings.size <= MOST_EDGES:
+        msg = (
+            f"step: the recorded drive crosses its middle {crossings.size} times, one edge is needed; check the trigger"
+        )
         raise NotIdentified(msg)
+    above = int(crossings[0])
     share = (half - drive[above - 1]) / (drive[above] - drive[above - 1])
     return float((above - 1 + share) / reference.rate_hz)
 
@@ -213,7 +219,9 @@ def _averaged(
     step = float(np.mean(size - base))
     noise = float(np.sqrt(np.mean([one.var(ddof=1) for one in before])))
     fault = 0
-    if max(float(np.max(np.abs(one))) for one in outputs) >= device.full_scale:
+    beyond = [np.sign(step) * (output - end) for output, end in zip(outputs, size, strict=True)]
+    at_end = max(float(np.max(np.abs(one))) for one in outputs) >= device.full_scale
+    if at_end or any(_cut_off(one, rate, noise) for one in beyond):
         fault = 2
     elif not abs(step) > 10.0 * noise / np.sqrt(len(final[0])) or noise == 0.0:
         fault, step = 1, step or 1.0
@@ -240,6 +248,17 @@ def _averaged(
         fault=float(fault),
         step=step,
     )
+
+
+def _cut_off(beyond: Array, rate: float, noise: float) -> bool:
+    """Whether the first overshoot of a response (n,) beyond its final value is cut off flat."""
+    first = int(np.argmax(beyond > 0.0)) if beyond.size and beyond[0] < 0.0 else beyond.size
+    top = first + int(np.argmax(beyond[first:])) if first < beyond.size else first
+    if top >= beyond.size or not beyond[top] > 0.0:
+        return False
+    low, high = span(beyond, top, 0.0)
+    lobe = np.pad(beyond[low : high + 1], CLOSE)
+    return flat_top(lobe, rate, (high - low + 1) / rate, noise, 0.0) > 0
 
 
 def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:

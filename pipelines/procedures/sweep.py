@@ -40,6 +40,7 @@ from schemas.errors import RecipeInvalid
 from schemas.exposure_profile import AMBIENT_HPA
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
+from schemas.tables import NOT_JUDGED
 from schemas.units import AXES
 
 SINGLE_TONE = 0.7
@@ -203,6 +204,11 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         except NotIdentified:
             return [], []
         return transfer_results(part, diagnosis, kept, out_unit)
+
+    def verdict(self, part: SweepPart, rows: pd.DataFrame) -> str:
+        """The verdict on the model of the transfer function."""
+        curves = self.compared(part, rows, {}, "")[1]
+        return curves[0].verdict if curves else NOT_JUDGED
 
     def chart(self, part: SweepPart, points: pd.DataFrame) -> Chart | None:
         """Magnitude with uncertainty, phase, coherence, and the residual of the model."""

@@ -14,7 +14,7 @@ from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_tra
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_effects.base import AMBIENT_C
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, PLAIN, Points, TransferFit, factor
-from pipelines.procedures.figures import FigureValue, probability
+from pipelines.procedures.figures import FigureValue, probability, with_uncertainty
 
 MOST_KEPT = 64
 _last_judged: dict[str, TransferDiagnosis] = {}
@@ -133,8 +133,8 @@ def _bandwidth_with_error(fit: TransferFit, top: float) -> tuple[float, float]:
 def _flatness(part: Any, points: Points) -> FigureValue:
     """Largest departure of the measured magnitude from that of the lowest fifth of the points."""
     if part.flat_to_hz is None:
-        note = "a flatness belongs to a band; set flat_to_hz in the recipe"
-        return FigureValue.not_determined("sweep_flatness_percent", part.axis, note)
+        note = "a flatness belongs to a band; set flat_to_hz"
+        return FigureValue.not_measured("sweep_flatness_percent", part.axis, note)
     f, size = points.conditions.frequency, np.abs(points.value)
     low = np.argsort(f)[: max(3, len(f) // 5)]
     rest = float(np.median(size[low]))
@@ -152,8 +152,8 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
     """Departure of the fitted sensitivity from the static scale, with the reference's uncertainty."""
     nominal = part.nominal_scale if static is None else float(static["xyz".index(part.axis)])
     if nominal is None:
-        note = "no static scale and no nominal_scale to compare with"
-        return FigureValue.not_determined("sweep_sensitivity_percent", part.axis, note)
+        note = "no static scale and no nominal_scale to compare with; set nominal_scale"
+        return FigureValue.not_measured("sweep_sensitivity_percent", part.axis, note)
     value = 100.0 * (abs(fit.sensitivity) / nominal - 1.0)
     error = float(np.hypot(100.0 * fit.sensitivity_error, part.reference_percent))
     return FigureValue("sweep_sensitivity_percent", part.axis, value, error)
@@ -205,15 +205,62 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
         )
         out.append(("after extension", text))
     out += _remains(diagnosis)
+    fit_effects = set(diagnosis.extended.effects)
     for p in diagnosis.extended.parameters:
         one = diagnosis.parameter(p.name)
         if p.log and not one.identified:
             out.append(("not identified", f"{p.name}: 95 % interval {one.low:.4g} … {one.high:.4g} {p.unit}"))
         elif p.name == "delay_s":
             text = f"{1e6 * one.value:.2f} µs, 95 % interval {1e6 * one.low:.2f} … {1e6 * one.high:.2f} µs"
+            if one.rival is not None:
+                *_, low, high = diagnosis.extended.of(p.name)
+                others = dict.fromkeys(
+                    name for fit in diagnosis.rivals for name in fit.effects if name not in fit_effects
+                )
+                text += (
+                    f" ({1e6 * low:.2f} … {1e6 * high:.2f} µs without {', '.join(others)}, which may make a part of it)"
+                )
             out.append(("delay", text))
     if diagnosis.next_hz:
         out.append(("next frequencies to measure", ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)))
+    return out
+
+
+TOO_GOOD_P = 1e-3
+"""Probability of so small a χ² below which the stated uncertainties are told to be too large."""
+
+
+def model_texts(diagnosis: TransferDiagnosis, points: Points) -> list[tuple[str, str]]:
+    """Subject and text of the figures of a model with U (k = 2), of its polarity, and of uncertainties that are too large."""
+    fit, out = diagnosis.extended, list[tuple[str, str]]()
+    if diagnosis.adequate is None:
+        return out
+    values = figures_of_model("z", diagnosis, points, "sweep")
+    names = ("bandwidth", WORD["natural_hz"], WORD["damping"])
+    units = (" Hz", " Hz", "")
+    known = [
+        f"{name} {with_uncertainty(one.value, 2.0 * one.uncertainty)}{unit}"
+        for name, unit, one in zip(names, units, values, strict=True)
+        if one.identified
+    ]
+    if known:
+        size = with_uncertainty(fit.sensitivity, 2.0 * abs(fit.sensitivity) * fit.sensitivity_error)
+        out.append(("figures", f"sensitivity {size} per g, {', '.join(known)} (k = 2)"))
+    if diagnosis.unexplained:
+        out.append(("not determined", f"{', '.join(names)}: {values[0].note}"))
+    elif not values[0].identified:  # of the parameters the diagnosis says it
+        out.append(("not determined", f"{names[0]}: {values[0].note}"))
+    turned = (
+        "the output is turned over: its phase at low frequency is π; exchange the wires, or give it a negative sign"
+    )
+    out.append(("polarity", turned if fit.sensitivity < 0.0 else "positive, the phase at low frequency is 0"))
+    share = float(np.sqrt(fit.chi_square / max(fit.dof, 1)))
+    if fit.dof > 0 and fit.p_value > 1.0 - TOO_GOOD_P:
+        text = (
+            f"the scatter is {share:.2g} of the stated uncertainties: they are too large for single points, or hold what all "
+            "points share; U of the figures is too large by as much"
+        )
+        out.append(("uncertainties", text))
     return out
 
 

@@ -221,7 +221,9 @@ def _sorted(curves: pd.DataFrame, order: dict[tuple[str, str], int]) -> pd.DataF
 
 def without_disturbed(terms: NoiseTerms, disturbed: Sequence[Sequence[Disturbance]]) -> NoiseTerms:
     """The terms of channels of which some hold what no noise explains: no mixture of terms describes these."""
-    return replace(terms, chi2=np.where([bool(found) for found in disturbed], np.inf, terms.chi2))
+    return replace(
+        terms, chi2=np.where([any(one.material for one in found) for found in disturbed], np.inf, terms.chi2)
+    )
 
 
 def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms:

@@ -46,6 +46,12 @@ def test_a_hand_held_record_is_recognised_fitted_and_judged_on_one_screen(rng: n
     assert one["command"] in " ".join(text.split())
     assert lines[-1].split()[:2] == ["tumbleline", "export"]
     assert any(line.lstrip().startswith("not recorded: temperature (") for line in lines)
+    for axis, across in (("x", "misalignment y "), ("y", "misalignment z "), ("z", "scale ")):
+        line = next(line for line in one["lines"] if line.startswith(f"{axis}: bias"))
+        assert across in line  # a frame that rests on x has three angles, each with its U
+        assert " ± " in line.split("scale ")[1]
+    Path("model.toml").write_text("name = 'other'\n")
+    assert "model.toml exists and is not the model" in refused("improve", "board.txt", "-o", "model.toml")
 
 
 def six_faces(rng: np.random.Generator, lean_deg: float) -> pd.DataFrame:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from inertial.dynamics.pulses import lone_samples
+from inertial.dynamics.pulse_faults import lone_samples
 
 
 def pulse(rng: np.random.Generator) -> tuple[np.ndarray, float, float]:
@@ -22,8 +22,9 @@ def pulse(rng: np.random.Generator) -> tuple[np.ndarray, float, float]:
     return (np.round(felt / 2.0) * 2.0 if kind == 2 else felt), float(rate), float(duration)
 
 
+@pytest.mark.parametrize("together", [1, 2])
 @pytest.mark.parametrize("block", range(3))
-def test_a_sample_that_is_off_is_found_and_nothing_else_is(block: int) -> None:
+def test_a_sample_that_is_off_is_found_and_nothing_else_is(block: int, together: int) -> None:
     missed, false = [], []
     for k in range(60):
         rng = np.random.default_rng([4471, block, k])
@@ -32,8 +33,10 @@ def test_a_sample_that_is_off_is_found_and_nothing_else_is(block: int) -> None:
             continue
         false.append(lone_samples(record, rate, duration).size > 0)
         at = int(rng.integers(20, record.size - 20))
-        record[at] += rng.choice([-1.0, 1.0]) * rng.uniform(0.4, 2.0) * np.ptp(record)
-        missed.append(at not in lone_samples(record, rate, duration))
+        record[at : at + together] += (
+            rng.choice([-1.0, 1.0], together) * rng.uniform(0.4, 2.0, together) * np.ptp(record)
+        )
+        missed.append(not np.any(np.abs(lone_samples(record, rate, duration) - at) < together))
     assert len(false) > 30
     assert sum(false) == 0
     assert np.mean(missed) < 0.1

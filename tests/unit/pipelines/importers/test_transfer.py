@@ -56,7 +56,10 @@ def test_the_missing_pole_is_named_the_error_falls_and_the_command_says_so_by_it
 
 
 @each([
-    ("f,h", "1,2", "column frequency_hz, magnitude"),
+    ("f,h", "1,2", r"no column is recognised as frequency, magnitude, phase .* --map frequency=…,magnitude=…,phase=…"),
+    ("frequency_hz,magnitude,phase", "1,2,0", r"column 'phase' has no unit, one of deg, rad is needed; add --unit-of phase=…"),
+    ("frequency_hz,magnitude,phase_rad", "1,2,0", "no magnitude uncertainty .*--map magnitude_uncert.*repeatability_percent"),
+    (HEAD, "1,-3,0,1,1", "a magnitude in dB needs --unit-of magnitude=dB"),
     (HEAD, "1,2,0,0,1", "a value above 0"),
     (HEAD, "1,2,x,1,1", "a finite number"),
     (HEAD, "1,2,0,1,1", "1 points"),

@@ -1,0 +1,231 @@
+"""Recordings of dynamic tests by the command that a user types: what is printed, and with which status it ends."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from in_process import document_of, refused, text_of
+from scipy import signal
+
+RATE_HZ, SIZE = 50_000.0, 4000
+TIME = np.arange(SIZE) / RATE_HZ
+SCALE = 0.0072
+OF_SHOCK = ("--map", "time=time_s,z=DUT_V,reference=REF_g", "--unit-of", "output=V,reference=g", "--units", "SN1")
+OF_STEP = ("--map", "time=time_s,z=OUT_V,reference=DRIVE_V", "--unit-of", "output=V,reference=V", "--units", "SN1")
+NO_BIAS = "not measured: shock_bias_shift_ug: no record at rest before and after the shocks"
+
+
+def half_sine(peak_g: float = 30.0, begins_s: float = 0.02, duration_s: float = 0.006) -> np.ndarray:
+    inside = (begins_s <= TIME) & (begins_s + duration_s > TIME)
+    return np.where(inside, peak_g * np.sin(np.pi * (TIME - begins_s) / duration_s), 0.0)
+
+
+def felt(force: np.ndarray, natural_hz: float = 1500.0, damping: float = 0.62) -> np.ndarray:
+    w = 2.0 * np.pi * natural_hz
+    return signal.lsim(([w**2], [1.0, 2.0 * damping * w, w**2]), force, TIME)[1]
+
+
+def shock(folder: Path, reference: np.ndarray, output: np.ndarray, *more: str, seed: int = 1) -> tuple[str, ...]:
+    """The words of the import of a shock with the noise of both channels."""
+    rng = np.random.default_rng(seed)
+    both = output + 2e-4 * rng.standard_normal(SIZE), reference + 0.02 * rng.standard_normal(SIZE)
+    path, part = folder / "shock.csv", folder / "shock.toml"
+    np.savetxt(path, np.c_[TIME, *both], fmt="%.9g", delimiter=",", header="time_s,DUT_V,REF_g", comments="")
+    part.write_text(f"scale = {SCALE}\n")
+    archive = ("--archive", str(folder / "archive"))
+    return ("import", str(path), "--procedure", "shock", "--set", str(part), *(more or OF_SHOCK), *archive)
+
+
+def step(folder: Path, drive: np.ndarray, output: np.ndarray) -> tuple[str, ...]:
+    """The words of the import of a step."""
+    rng = np.random.default_rng(2)
+    both = output + 2e-4 * rng.standard_normal(SIZE), drive + 0.002 * rng.standard_normal(SIZE)
+    path = folder / "step.csv"
+    np.savetxt(path, np.c_[TIME, *both], fmt="%.9g", delimiter=",", header="time_s,OUT_V,DRIVE_V", comments="")
+    return ("import", str(path), "--procedure", "step_response", *OF_STEP, "--archive", str(folder / "archive"))
+
+
+def test_a_figure_that_a_file_cannot_hold_is_said_once_and_fails_nothing(tmp_path: Path) -> None:
+    words = shock(tmp_path, half_sine(), SCALE * felt(half_sine()))
+    text = text_of(*words, status=0)
+    assert text.count("shock_bias_shift_ug") == 1
+    assert NO_BIAS in text
+    document = document_of(*words, status=0)
+    assert document["verdict"] == "adequate"
+    assert [one["figure"] for one in document["figures"] if not one["measured"]] == ["shock_bias_shift_ug"]
+
+
+def test_a_sensor_alone_has_what_its_own_pulse_gives_and_passes(tmp_path: Path) -> None:
+    alone = ("--map", "time=time_s,z=DUT_V", "--unit-of", "output=V", "--units", "SN1")
+    text = text_of(*shock(tmp_path, half_sine(), SCALE * felt(half_sine()), *alone), status=0)
+    assert "not measured: shock_sensitivity_percent, shock_undershoot_percent: recorded without a reference" in text
+
+
+def test_a_comparison_that_is_not_adequate_fails(tmp_path: Path) -> None:
+    shifted = 0.15 * np.clip(np.cumsum(half_sine()) / half_sine().sum(), 0.0, 1.0)
+    text = text_of(*shock(tmp_path, half_sine(), SCALE * (felt(half_sine()) + shifted)), status=1)
+    assert "NOT ADEQUATE" in text
+    assert "missing effect: zero_shift" in text
+
+
+def test_a_channel_of_the_other_sign_is_named_as_that_and_compared_with_nothing(tmp_path: Path) -> None:
+    text = text_of(*shock(tmp_path, half_sine(), -SCALE * felt(half_sine())), status=1)
+    assert "its sign is turned over" in text
+    assert "CANNOT BE JUDGED" in text
+
+
+def test_a_second_pulse_is_told_and_enters_no_figure(tmp_path: Path) -> None:
+    twice = half_sine() + half_sine(18.0, 0.055)
+    words = shock(tmp_path, twice, SCALE * felt(twice))
+    assert "another pulse: 18 g at 0.058 s of record 1" in text_of(*words, status=0)
+    figures = {one["figure"]: one["value"] for one in document_of(*words)["figures"]}
+    assert figures["shock_return_ms"] < 1.0
+    assert abs(figures["shock_zero_shift_percent"]) < 0.02
+
+
+def test_a_pulse_before_the_largest_lies_in_its_baseline_and_leaves_no_figure(tmp_path: Path) -> None:
+    twice = half_sine(12.0, 0.015) + half_sine(30.0, 0.05)
+    text = text_of(*shock(tmp_path, twice, SCALE * felt(twice)), status=1)
+    assert "another pulse: 12 g at 0.018 s" in text
+    assert "another pulse lies before the largest, in its baseline" in text
+
+
+@pytest.mark.parametrize("share", [0.78, 0.93])
+@pytest.mark.parametrize("what", ["the output", "the reference"])
+def test_a_flat_top_is_told_without_a_full_scale(what: str, share: float, tmp_path: Path) -> None:
+    reference, output = half_sine(), SCALE * felt(half_sine())
+    if what == "the output":
+        output = np.minimum(output, share * output.max())
+    else:
+        reference = np.minimum(reference, share * reference.max())
+    assert f"1 of 1 shocks clip {what}" in text_of(*shock(tmp_path, reference, output), status=1)
+
+
+def test_two_neighbours_that_depart_together_are_told(tmp_path: Path) -> None:
+    output = SCALE * felt(half_sine())
+    output[1100:1102] += 0.3, -0.2
+    assert "a sample that departs alone, at 0.022 s" in text_of(*shock(tmp_path, half_sine(), output), status=1)
+
+
+@pytest.mark.parametrize("levels", [(0.0, 2.0), (2.0, 0.0), (0.0, -2.0)])
+def test_a_step_has_its_figures_whichever_way_it_goes(levels: tuple[float, float], tmp_path: Path) -> None:
+    drive = np.where(TIME >= 0.02, levels[1], levels[0])
+    words = step(tmp_path, drive, 0.05 * (levels[0] + felt(drive - levels[0], 900.0, 0.6)))
+    figures = {one["figure"]: one for one in document_of(*words, status=0)["figures"]}
+    overshoot = figures["step_overshoot_percent"]
+    true = 100.0 * np.exp(-np.pi * 0.6 / 0.8)
+    assert abs(overshoot["value"] - true) < 3.0 * overshoot["uncertainty"]
+
+
+@pytest.mark.parametrize("damping", [0.1, 0.3])
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_an_overshoot_that_is_cut_off_is_told_and_a_round_one_is_not(
+    damping: float, share: float, tmp_path: Path
+) -> None:
+    drive = np.where(TIME >= 0.02, 2.0, 0.0)
+    output = 0.05 * felt(drive, 900.0, damping)
+    overshoot = output.max() - 0.1
+    cut = text_of(*step(tmp_path, drive, np.minimum(output, 0.1 + share * overshoot)), status=1)
+    assert "the output is clipped; lower volts" in cut
+    assert "step_overshoot_percent z " in text_of(*step(tmp_path, drive, output))
+
+
+def test_a_drive_without_an_edge_is_refused_as_that(tmp_path: Path) -> None:
+    assert "one edge is needed; check the trigger" in refused(*step(tmp_path, np.ones(SIZE), np.zeros(SIZE)))
+
+
+def test_two_neighbours_of_a_step_that_depart_together_are_told(tmp_path: Path) -> None:
+    drive = np.where(TIME >= 0.02, 2.0, 0.0)
+    output = 0.05 * felt(drive, 900.0, 0.6)
+    output[1500:1502] += 0.05, 0.03
+    assert "a sample departs alone" in text_of(*step(tmp_path, drive, output), status=1)
+
+
+def sweep(folder: Path, head: str, *more: str, form: str = "", scatter: float = 1.0) -> tuple[str, ...]:
+    """The words of the import of points of a sensor of 1500 Hz, a scale of 0.07 and a delay of 40 µs: 0.5 % and 0.3° a point.
+
+    form : ``dB`` and ``rad`` for the units of the columns, ``-`` for the other polarity, ``u`` for columns of uncertainty
+    """
+    rng, f = np.random.default_rng(3), np.geomspace(5.0, 4000.0, 45)
+    h = 0.07 / (1.0 - (f / 1500.0) ** 2 + 1.24j * f / 1500.0) * np.exp(-2j * np.pi * f * 40e-6)
+    h = -h if "-" in form else h
+    size = np.abs(h) * (1.0 + 0.005 * scatter * rng.standard_normal(f.size))
+    angle = np.angle(h) + np.radians(0.3) * scatter * rng.standard_normal(f.size)
+    own = [f, 20.0 * np.log10(size) if "dB" in form else size, angle if "rad" in form else np.degrees(angle)]
+    own += [np.full(f.size, 0.5), np.full(f.size, np.radians(0.3) if "rad" in form else 0.3)] if "u" in form else []
+    np.savetxt(folder / "points.csv", np.column_stack(own), fmt="%.9g", delimiter=",", header=head, comments="")
+    words = ("import", str(folder / "points.csv"), "--procedure", "sweep", "--units", "SN1", *more)
+    return (*words, "--archive", str(folder / "archive"))
+
+
+OWN = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
+
+
+def test_points_of_a_sweep_have_their_figures_with_u_and_the_polarity_in_the_text(tmp_path: Path) -> None:
+    text = text_of(*sweep(tmp_path, OWN, form="u"), status=0)
+    assert "figures: sensitivity 0.0700" in text
+    for figure in ("bandwidth 16", "natural frequency 1", "damping ratio 0.62"):
+        assert figure in text
+    assert "polarity: positive" in text
+    assert "of the stated uncertainties" not in text
+    assert "without moving_average, one_pole, two_pole, which may make a part of it" in text
+    turned = text_of(*sweep(tmp_path, OWN, form="u-"), status=0)
+    assert "sensitivity −0.0700" in turned
+    assert "the output is turned over: its phase at low frequency is π" in turned
+
+
+def test_a_delay_beside_a_filter_that_may_be_absent_is_never_longer_than_both(tmp_path: Path) -> None:
+    delay = document_of(*sweep(tmp_path, OWN, form="u", scatter=0.15), status=0)["parameters"]["delay_s"]
+    assert 0.0 < delay["low"] < 35e-6  # a filter of some kHz may make a part of it
+    assert delay["high"] < 42e-6
+
+
+def test_uncertainties_that_are_too_large_are_told_and_fail_nothing(tmp_path: Path) -> None:
+    text = text_of(*sweep(tmp_path, OWN, form="u", scatter=0.3), status=0)
+    assert "uncertainties: the scatter is 0.3" in text
+
+
+@pytest.mark.parametrize(
+    ("head", "form", "more"),
+    [
+        ("Frequency (Hz),Magnitude (dB),Phase (rad)", "dB rad", ()),
+        ("frequency_hz,magnitude,phase", "dB rad", ("--unit-of", "magnitude=dB,phase=rad")),
+        ("a,b,c", "", ("--map", "frequency=1,magnitude=2,phase=3", "--unit-of", "frequency=Hz,phase=deg")),
+    ],
+)
+def test_other_columns_and_units_are_recognised_or_stated(
+    head: str, form: str, more: tuple[str, ...], tmp_path: Path
+) -> None:
+    part = tmp_path / "points.toml"
+    part.write_text("repeatability_percent = 0.5\nrepeatability_deg = 0.3\n")
+    text = text_of(*sweep(tmp_path, head, *more, "--set", str(part), form=form), status=0)
+    assert "columns: frequency " in text
+    assert "sensitivity 0.0700" in text
+
+
+def test_radians_that_are_called_degrees_are_told(tmp_path: Path) -> None:
+    words = sweep(tmp_path, OWN, form="u rad")
+    assert "add --unit-of phase=rad" in text_of(*words, status=1)
+    text_of(*words, "--unit-of", "phase=rad,phase_uncertainty=rad", status=0)
+
+
+def test_a_key_of_records_at_rest_or_of_waveforms_is_refused_for_points(tmp_path: Path) -> None:
+    assert "--set face is for records at rest" in refused(*sweep(tmp_path, OWN, "--set", "face=+z", form="u"))
+    part = tmp_path / "part.toml"
+    part.write_text("stroke_mm = 5.0\n")
+    assert "key stroke_mm is not for points" in refused(*sweep(tmp_path, OWN, "--set", str(part), form="u"))
+
+
+def test_waveforms_of_a_sweep_pass_without_the_figures_that_nobody_asked_for(tmp_path: Path) -> None:
+    rng, rate = np.random.default_rng(4), 10_000.0
+    t = np.arange(40_000) / rate
+    fine = signal.resample_poly(0.5 * signal.chirp(t, 5.0, t[-1], 3000.0, method="log"), 10, 1)
+    w = 2.0 * np.pi * 800.0
+    output = signal.lsim(([w**2], [1.0, 1.2 * w, w**2]), fine, np.arange(fine.size) / (10.0 * rate))[1][::10]
+    columns = t, 0.1 * output + 2e-4 * rng.standard_normal(t.size), fine[::10]
+    path = tmp_path / "swept.csv"
+    np.savetxt(path, np.c_[columns], fmt="%.9g", delimiter=",", header="time_s,DUT_V,REF_g", comments="")
+    text = text_of("import", path, "--procedure", "sweep", *OF_SHOCK, "--archive", tmp_path / "archive", status=0)
+    assert "not measured: sweep_flatness_percent: a flatness belongs to a band; set flat_to_hz" in text
+    assert "not measured: sweep_sensitivity_percent: no static scale and no nominal_scale" in text
+    assert text.endswith("adequate")
