@@ -17,7 +17,7 @@ from inertial.design import Values
 from inertial.errors import NotIdentified
 from inertial.fits.descent import descended
 from inertial.fits.linear import LotFit, force_along_axes, response_matrix
-from inertial.fits.norm_noise import PlausibleNoise, SolvedNorms
+from inertial.fits.norm_noise import PlausibleNoise, SolvedNorms, whitened
 from inertial.state import State
 
 _SETTLED = 1e-10  # share of the cost that a step no longer takes off
@@ -66,8 +66,8 @@ def fit_norms(  # noqa: PLR0913 - what a fit needs, and what its errors are aver
     ----------
     effects : ids of the model, all of the sensor; bias and scale among them
     output : (units, n, 3), output unit; state : of the dwells, its force is not read
-    whiten : (units, n, n), inverse root of the covariance of the norms up to a factor, or (units, n) where it is diagonal; zeros
-        leave dwells out
+    whiten : (units, n, n), inverse root of the covariance of the norms up to a factor, or one of
+        :func:`inertial.fits.norm_noise.thin_whitener`; zeros leave dwells out
     start : bias (units, 3) and response (units, 3, 3) to begin with
     norm : gravity in g
     nonlinear : values of nonlinear parameters and constants by effect id
@@ -135,7 +135,7 @@ class _Work:
 
     def white(self, columns: Array) -> Array:
         """Columns (units, n, m) with white noise of one variance in them."""
-        return columns * self.whiten[..., None] if self.whiten.ndim == 2 else self.whiten @ columns
+        return whitened(self.whiten, columns)
 
     def cost(self, theta: Array) -> Array:
         """Whitened sum of squares, (units,)."""
@@ -202,7 +202,7 @@ class _Work:
     def finished(self, theta: Array, plausible: Sequence[PlausibleNoise], weights: Array | None) -> NormFit:
         """The fit with covariances, residuals and degrees of freedom."""
         rows, more = self.rows(theta)
-        used = self.whiten != 0.0 if self.whiten.ndim == 2 else np.any(self.whiten != 0.0, axis=-1)
+        used = np.any(self.whiten != 0.0, axis=-1)
         free, count = int(self.free.sum()), used.sum(axis=-1)
         dof = count - free - more.shape[-1]
         if np.any(dof < 1):

@@ -199,6 +199,8 @@ DERIVED: tuple[Derived, ...] = (
 
 OUTPUT_COLUMNS = ("out_x", "out_y", "out_z")
 SPREAD_COLUMNS = ("sd_x", "sd_y", "sd_z")
+SLOW_COLUMNS = ("slow_sd_x", "slow_sd_y", "slow_sd_z")
+"""Standard deviation of white noise that is as loud as the slow part of the samples: over √n the error of their mean."""
 FORCE_COLUMNS = ("force_x", "force_y", "force_z")
 ANGLE_COLUMNS = ("outer_deg", "inner_deg")
 BOOKKEEPING = (
@@ -211,6 +213,7 @@ KNOWN_COLUMNS = frozenset(
         *BOOKKEEPING,
         *OUTPUT_COLUMNS,
         *SPREAD_COLUMNS,
+        *SLOW_COLUMNS,
         *FORCE_COLUMNS,
         *(row.column for row in RECORDED if row.attribute),
     )

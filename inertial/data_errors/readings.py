@@ -22,6 +22,7 @@ class Readings:
 
     force : (units, n, 3), g, commanded
     output, spread : (units, n, 3), output unit; mean and standard deviation of a sample; spread None if not recorded
+    slow : (units, n, 3), output unit; deviation by which means are uncertain, :data:`inertial.quantities.SLOW_COLUMNS`; or None
     count : (units, n), samples averaged; duration : (units, n), s; each None if not recorded
     time : (units, n), s
     temperature, chamber, vibration : (units, n), °C, °C, g; None if not recorded
@@ -34,6 +35,7 @@ class Readings:
     output: Array
     time: Array
     spread: Array | None = None
+    slow: Array | None = None
     count: Array | None = None
     duration: Array | None = None
     temperature: Array | None = None
@@ -48,6 +50,14 @@ class Readings:
         """Which units have which dwells, (units, n)."""
         there: Flags = np.all(np.isfinite(self.output), axis=-1)
         return there
+
+    @property
+    def mean_error(self) -> Array | None:
+        """Standard errors of the means, (units, n, 3), output unit, as the samples show them; None if not recorded."""
+        deviation = self.spread if self.slow is None else self.slow
+        if deviation is None or self.count is None:
+            return None
+        return deviation / np.sqrt(np.maximum(self.count, 1.0))[..., None]
 
     @property
     def warm(self) -> Array | None:

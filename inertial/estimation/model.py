@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from inertial.arrays import Array
+from inertial.distributions import chi2_quantile
 from inertial.errors import NotIdentified
 from inertial.estimation.bases import orthonormal
 from inertial.estimation.candidate import Candidate
@@ -21,8 +22,11 @@ _LONG = 400
 """Number of dwells above which shares are searched by half decades, because each whitener takes time and memory."""
 
 
-_SHARE_OF_WHITE = 0.5
-"""Part of the recorded white variance that the noise of norms has at the least."""
+_SHARE_OF_SCATTER = 0.5
+"""Part of the scatter of norms that their white noise has at the least, where that recorded in the samples is larger."""
+
+_CONTRADICTED = 0.025
+"""Probability of so little scatter of norms, below which the recorded noise is not that of the means."""
 
 
 _TURNS = 3
@@ -143,14 +147,16 @@ class Model:
         """Variances (blocks,) over the recorded white ones below which those of a norm cannot be; zero where nothing is known.
 
         White noise of the samples is a lower bound. Few dwells that fit well by chance otherwise pass for strong wander with less
-        white noise than their samples have. A record that scatters less than its samples say has a lower bound of its own.
+        white noise than their samples have, and errors are stated too small where the scatter is small by chance. A record that
+        scatters less than chance allows, as where a vibration averages out in its means, has a lower bound of its own.
         """
         lot = self.problem.lot
         if not (lot.radial and lot.recorded):
             return np.zeros(self.problem.blocks)
         space = self._space(self.problem.covariance.white_noise())
-        scatter = space.squares / np.maximum(space.by_block, 1.0)
-        return _SHARE_OF_WHITE * np.minimum(scatter, 1.0)
+        dof = np.maximum(space.by_block, 1.0)
+        contradicted = space.squares < chi2_quantile(_CONTRADICTED, dof)
+        return np.where(contradicted, _SHARE_OF_SCATTER * space.squares / dof, 1.0)
 
     def _rough(self, shares: Shares) -> Space:
         """The space at shares, with the blocks weighted by their known variances."""

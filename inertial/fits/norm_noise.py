@@ -86,6 +86,28 @@ def with_runs(whiten: Array, columns: Array) -> Array:
     return np.asarray(np.linalg.solve(root, whiten), dtype=np.float64)
 
 
+def thin_whitener(error: Array, columns: Array) -> Array:
+    """A whitener (units, n, 1 + k) of independent noise to which columns with unit variance are added, for long records.
+
+    With white noise e and B = C/e = U·S·Wᵀ it is (I − A·Aᵀ)/e, A = U·√(1 − 1/√(1 + S²)): first 1/e, then A.
+
+    Parameters
+    ----------
+    error : (units, n), infinite for dwells that are left out; columns : (units, n, k)
+    """
+    own = np.where(np.isfinite(error), 1.0 / error, 0.0)[..., None]
+    u, s, _ = np.linalg.svd(own * columns, full_matrices=False)
+    return np.concatenate([own, u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + s[..., None, :] ** 2))], axis=-1)
+
+
+def whitened(whiten: Array, columns: Array) -> Array:
+    """Columns (..., n, m) with white noise of one variance, by a whitener (..., n, n) or one of :func:`thin_whitener`."""
+    if whiten.shape[-1] == whiten.shape[-2]:
+        return np.asarray(whiten @ columns)
+    own, along = whiten[..., :1] * columns, whiten[..., 1:]
+    return np.asarray(own - along @ (np.swapaxes(along, -1, -2) @ own))
+
+
 @dataclass(frozen=True)
 class PlausibleNoise:
     """A noise that the residuals of a norm fit do not rule out.
@@ -105,20 +127,23 @@ class SolvedNorms:
     Parameters
     ----------
     rows : (n, k), derivatives of the residuals; left : (n,), residuals
-    whiten : (n, n) or (n,), of the noise; least : smallest variance of the whitened residuals
+    whiten : of the noise, as :func:`whitened` takes it; least : smallest variance of the whitened residuals
     """
 
     def __init__(self, rows: Array, left: Array, weight: float, whiten: Array, least: float = 0.0) -> None:
         self.weight, self.least, self.whiten = weight, least, whiten
-        white = whiten[:, None] * rows if whiten.ndim == 1 else whiten @ rows
-        rest = whiten * left if whiten.ndim == 1 else whiten @ left
+        white, rest = whitened(whiten, rows), whitened(whiten, left[:, None])[:, 0]
         size = np.linalg.norm(white, axis=0)
         self.size = np.where(size > 0.0, size, 1.0)
-        unit = white / self.size
-        self.inverse = np.linalg.pinv(unit.T @ unit, rcond=1e-13)
-        self.step = self.inverse @ (unit.T @ rest)
-        self.chi2 = max(float(rest @ rest - self.step @ (unit.T @ rest)), 0.0)
-        self.gain = self.inverse @ (unit.T * whiten if whiten.ndim == 1 else unit.T @ whiten) / self.size[:, None]
+        self.unit = white / self.size
+        self.inverse = np.linalg.pinv(self.unit.T @ self.unit, rcond=1e-13)
+        self.step = self.inverse @ (self.unit.T @ rest)
+        self.chi2 = max(float(rest @ rest - self.step @ (self.unit.T @ rest)), 0.0)
+
+    @property
+    def gain(self) -> Array:
+        """Change (k, n) of the coefficients by the residuals, for a whitener (n, n)."""
+        return self.inverse @ (self.unit.T @ self.whiten) / self.size[:, None]
 
     def covariance(self, dof: int) -> Array:
         """Second moment (k, k) about the solution: of the noise, with Student's factor for k = 2, and the step to the fit."""

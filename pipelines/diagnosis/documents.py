@@ -25,9 +25,7 @@ class ErrorFigures(TypedDict):
     floor_ug: Annotated[
         float | None, "noise of the measurement: what it leaves in the residuals of a correct model, µg"
     ]
-    white_noise_ug: NotRequired[
-        Annotated[float | None, "white noise alone, from the samples of each dwell (sd/√n), µg"]
-    ]
+    white_noise_ug: NotRequired[Annotated[float | None, "white noise alone, from the samples of each dwell, µg"]]
     p_value: Annotated[float | None, "probability of such a residual if the model is adequate, at least 1e-300"]
     wander_share: NotRequired[Annotated[float, "variance of the 1/f noise over that of the white noise"]]
     walk_share: NotRequired[

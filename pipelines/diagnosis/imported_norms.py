@@ -155,11 +155,17 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, An
     units = range(len(done.measured.units))
     lines += [_axis_line(done, spread, (unit, k), out_unit) for unit in units for k in range(3)]
     warm = _holds_at(done)
-    if warm is not None and TEMPERATURE not in done.fit.fit.effects:
+    if TEMPERATURE in done.fit.fit.effects:
+        heat = np.asarray(done.measured.readings.warm)[done.measured.readings.there]
+        lines.append(
+            f"values and U at {T_REFERENCE:g} °C, from which the model's terms in temperature count; the dwells were at "
+            f"{heat.min():.1f} to {heat.max():.1f} °C"
+        )
+    elif warm is not None:
         runs = (MICRO * RUN_PER_K[name] for name in (TEMPERATURE, "scale_temperature"))
         lines.append(
-            "at {:.1f} °C, the mean of the dwells; U allows a run of bias and scale by {:.0f} µg and {:.0f} ppm per K, as far as "
-            "the dwells leave it open".format(warm, *runs)
+            "values and U at {:.1f} °C, the mean of the dwells; U allows a run of bias and scale by {:.0f} µg and {:.0f} ppm "
+            "per K, as far as the dwells leave it open".format(warm, *runs)
         )
     share = _bias(done)[0] / done.scale[0]
     if out_unit in {"g", "m/s^2"}:  # the zero of counts and volts may lie anywhere

@@ -9,7 +9,14 @@ import numpy as np
 import pandas as pd
 
 from inertial.arrays import Array, Index
-from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, OUTPUT_COLUMNS, SPREAD_COLUMNS
+from inertial.quantities import (
+    ANGLE_COLUMNS,
+    FORCE_COLUMNS,
+    KNOWN_COLUMNS,
+    OUTPUT_COLUMNS,
+    SLOW_COLUMNS,
+    SPREAD_COLUMNS,
+)
 from pipelines.archive import Archive, Run
 from pipelines.importers import files, values
 from pipelines.tables.dwell_table import output_axes
@@ -111,7 +118,8 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
         _known_along(frame)
     _all_or_none(frame, FORCE_COLUMNS, where)
     _all_or_none(frame, ANGLE_COLUMNS, where)
-    _all_or_none(frame, tuple(SPREAD_COLUMNS[axis] for axis in output_axes(frame.columns)), where)
+    for names in (SPREAD_COLUMNS, SLOW_COLUMNS):
+        _all_or_none(frame, tuple(names[axis] for axis in output_axes(frame.columns)), where)
     _plausible(frame, where)
     frame = table_check.check("dwells", frame, where=where)
     return frame.sort_values(["unit", "dwell"], kind="stable").reset_index(drop=True)

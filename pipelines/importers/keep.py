@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
+from inertial.quantities import OUTPUT_COLUMNS, SLOW_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive, Run, code_hash, stage_key
 from pipelines.archive.buffered_run import BufferedRun
 from pipelines.archive.provenance import provenance
@@ -102,7 +102,7 @@ def complete_table(dwells: pd.DataFrame, unit: str = "") -> tuple[pd.DataFrame, 
         told += [f"outputs in {unit}: {reason}"] if unit else []
     if unit:
         dwells["out_unit"], factor = OUTPUT_UNITS[unit]
-        spreads = [SPREAD_COLUMNS[axis] for axis in output_axes(dwells.columns)]
+        spreads = [names[axis] for axis in output_axes(dwells.columns) for names in (SPREAD_COLUMNS, SLOW_COLUMNS)]
         for column in (*outputs, *(name for name in spreads if name in dwells.columns)):
             dwells[column] *= factor
     for column, value in (("kind", "dwell"), ("pose", "dwell " + dwells["dwell"].astype(str)), ("slot", 0)):

@@ -10,6 +10,7 @@ import pandas as pd
 
 from inertial import frames
 from inertial.arrays import Array, Index
+from inertial.estimation.slow_noise import FEWEST_SAMPLES, slow_deviation
 from inertial.quantities import ANGLE_COLUMNS, BY_COLUMN, FORCE_COLUMNS
 from pipelines.importers.mapping import FACES, OUTPUT_UNITS, TILT, Mapping
 from pipelines.importers.stretches import Stretches
@@ -75,6 +76,8 @@ def dwells_of_stretches(
             "pose": list(intervals.labels),
         }
     )
+    if min(rows.size for rows in inside) >= FEWEST_SAMPLES:
+        frame[[f"slow_sd_{axis}" for axis in letters]] = slow_deviation([part[:, :m] for part in parts])
     return finished(frame, mapping)
 
 

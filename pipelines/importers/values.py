@@ -8,7 +8,15 @@ import numpy as np
 import pandas as pd
 
 from inertial.arrays import Array
-from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST, LARGEST_TIME_S, RECORDED, SPREAD_COLUMNS
+from inertial.quantities import (
+    BY_COLUMN,
+    FORCE_COLUMNS,
+    LARGEST,
+    LARGEST_TIME_S,
+    RECORDED,
+    SLOW_COLUMNS,
+    SPREAD_COLUMNS,
+)
 from pipelines.importers.content import Content
 from schemas.errors import DataRejected, did_you_mean
 from schemas.foreign import foreign, shown
@@ -20,7 +28,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     **{f"{name}_command_deg": (row.lowest, row.highest) for name, row in _ANGLES.items()},
     "duration_s": (0.0, LARGEST_TIME_S),
     **dict.fromkeys(FORCE_COLUMNS, (-_FORCE_G, _FORCE_G)),
-    **dict.fromkeys((*SPREAD_COLUMNS, "full_scale"), (0.0, LARGEST)),
+    **dict.fromkeys((*SPREAD_COLUMNS, *SLOW_COLUMNS, "full_scale"), (0.0, LARGEST)),
     "rate_hz": (1e-9, 1e9),
     "n": (1.0, 2.0**53),
     **dict.fromkeys(("dwell", "soak", "record"), (0.0, 2.0**53)),

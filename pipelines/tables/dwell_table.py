@@ -16,6 +16,7 @@ from inertial.quantities import (
     FORCE_COLUMNS,
     OUTPUT_COLUMNS,
     RECORDED,
+    SLOW_COLUMNS,
     SPREAD_COLUMNS,
     is_covariate,
 )
@@ -72,6 +73,7 @@ class DwellTable:
         self.axes = output_axes(frame.columns)
         self.outputs = tuple(OUTPUT_COLUMNS[axis] for axis in self.axes)
         self.spreads = tuple(SPREAD_COLUMNS[axis] for axis in self.axes)
+        self.slow = tuple(SLOW_COLUMNS[axis] for axis in self.axes)
 
     def common(self) -> list[int]:
         """Numbers of the dwells that every unit has."""

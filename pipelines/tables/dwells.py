@@ -165,6 +165,7 @@ def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measu
         axes=table.axes,
         time=table.grid("time_s"),
         spread=table.by_axis(table.spreads) if table.has(*table.spreads) else None,
+        slow=table.by_axis(table.slow) if table.has(*table.slow) else None,
         count=table.optional("n"),
         duration=table.optional("duration_s"),
         temperature=table.optional("unit_C"),

@@ -61,7 +61,7 @@ def lot_of_norms(readings: Readings, state: State, like: Readings, *, square: bo
         outputs.append(corrected)
         errors.append(np.where(there[:, None], _white(readings, unit, fit, size[:, 0]), np.inf))
     eye = np.broadcast_to(np.eye(3), (len(forces), 3, 3))
-    recorded = readings.spread is not None and readings.count is not None
+    recorded = readings.mean_error is not None
     known = replace(state, force=np.stack(forces), memory={})
     return Lot(known, np.stack(outputs), np.stack(errors), eye, radial=True, recorded=recorded)
 
@@ -158,12 +158,11 @@ def _heat(readings: Readings, unit: int, there: NDArray[np.bool_]) -> Array | No
 
 
 def _white(readings: Readings, unit: int, fit: EllipsoidFit, size: Array) -> Array:
-    """White standard errors of a unit's dwells by axis, (n, 3), g: sd/√n where recorded, else from the scatter of the norms."""
+    """White standard errors of a unit's dwells by axis, (n, 3), g: of the samples, else from the scatter of the norms."""
     scatter = max(float(fit.rms), 1e-12)
-    if readings.spread is None or readings.count is None:
+    if readings.mean_error is None:
         return np.full((size.size, 3), scatter)
-    own = readings.spread[unit] / np.sqrt(np.maximum(readings.count[unit], 1.0))[:, None]
-    error = np.sqrt((own**2) @ (fit.correction**2).T)
+    error = np.sqrt((readings.mean_error[unit] ** 2) @ (fit.correction**2).T)
     known = np.isfinite(error).all(axis=1) & (error > 0.0).all(axis=1)
     if not known.any():
         return np.full((size.size, 3), scatter)

@@ -7,7 +7,7 @@ from generated import SOME
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
+from inertial.quantities import OUTPUT_COLUMNS, SLOW_COLUMNS, SPREAD_COLUMNS
 from pipelines.importers.mapping import OUTPUT_UNITS, build
 from pipelines.importers.record import imported
 from pipelines.rerun.import_steps import zero_of_import
@@ -58,7 +58,7 @@ def in_g(frame, output, spread, columns, unit, order, **keys) -> pd.DataFrame:
     content = {"columns": columns, "units": {"output": unit}, "unit": "A1", "axes": axes, "signs": signs}
     dwells = imported(file, build(content | keys, "t"), "f.csv").dwells
     assert dwells is not None
-    scaled = [*OUTPUT_COLUMNS, *SPREAD_COLUMNS]
+    scaled = dwells.columns.intersection([*OUTPUT_COLUMNS, *SPREAD_COLUMNS, *SLOW_COLUMNS])
     dwells[scaled] /= PER_G[dwells["out_unit"].iloc[0]]
     return dwells.drop(columns="out_unit").sort_index(axis=1)
 

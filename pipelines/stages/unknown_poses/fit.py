@@ -14,7 +14,7 @@ from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
-from inertial.fits.norm_noise import PlausibleNoise, runs_left_out, with_runs
+from inertial.fits.norm_noise import PlausibleNoise, runs_left_out, thin_whitener, with_runs
 from inertial.fits.wander import student
 from inertial.noise.flicker import SLOWEST_DIAGNOSED, flicker_kernel
 from inertial.noise.measurands import DAY_S, instability, of_a_day, walk_kernel
@@ -127,14 +127,13 @@ def _with_run(model: Model, effects: Sequence[str], runs: Array) -> Model:
 
 
 def whitener(model: Model, runs: Array) -> Array:
-    """Inverse roots of the covariances of the units' norms, (units, n, n), g⁻¹; (units, n) for records too long for them.
+    """Whiteners of the units' norms, g⁻¹; thin ones of white noise and runs for records too long for a model of wander.
 
-    ``runs`` are those of :func:`inertial.fits.norm_noise.runs_left_out`; such long records have them in no covariance.
+    ``runs`` are those of :func:`inertial.fits.norm_noise.runs_left_out`.
     """
     covariance, noise, n = model.problem.covariance, model.noise, model.problem.n
     if n > LONGEST:
-        error = model.problem.error
-        return np.where(np.isfinite(error), 1.0 / np.where(np.isfinite(error), error, 1.0), 0.0)
+        return thin_whitener(model.problem.error * noise.scale[:, None], runs)
     eye = np.broadcast_to(np.eye(n), (model.problem.blocks, n, n))
     return with_runs(covariance.whiten(eye, noise.shares) / noise.scale[:, None, None], runs)
 

@@ -80,8 +80,8 @@ def _one(
     n = len(direction)
     reading = np.full(n, white)
     error = np.full((n, 3), white) * scale[0]
-    if readings.spread is not None and readings.count is not None:
-        error = readings.spread[0] / np.sqrt(np.maximum(readings.count[0], 1.0))[:, None]
+    if readings.mean_error is not None:
+        error = readings.mean_error[0]
         reading = np.sqrt(np.sum((direction * error / scale[0]) ** 2, axis=1))
     kinds = dwells["kind"].to_numpy().astype(np.str_)
     used = np.asarray(kinds == FITTED)

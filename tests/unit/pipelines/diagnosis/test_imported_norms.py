@@ -104,7 +104,7 @@ def test_nine_parameters_without_weights_are_those_of_the_ellipsoid() -> None:
     ellipsoid = fit_ellipsoid(output, norm=1.001)
     state = measured(dwells).state
     start = ellipsoid.bias[None] + 3.0, 1.001 * ellipsoid.response[None]
-    norm_fit = fit_norms(PLAIN, state, output[None], np.ones((1, 40)), start, norm=1.001)
+    norm_fit = fit_norms(PLAIN, state, output[None], np.ones((1, 40, 1)), start, norm=1.001)
     np.testing.assert_allclose(norm_fit.fit.response()[0], ellipsoid.response, rtol=1e-7, atol=1e-6)
     np.testing.assert_allclose(norm_fit.fit.coefficients[0, :, 0], ellipsoid.bias, rtol=1e-9)
     np.testing.assert_allclose(norm_fit.left[0], ellipsoid.norm_residuals, atol=1e-9)
