@@ -26,7 +26,7 @@ from pipelines.tables.frames import empty_table, joined_parts, picked
 from schemas.errors import DataRejected
 from schemas.units import MICRO
 
-LONG_S = 1800.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of four at most
+LONG_S = 3600.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of three at most
 
 
 def fit(
