@@ -43,6 +43,7 @@ from pipelines.planning.requirement import Requirement, candidates, temperature_
 from pipelines.planning.soak_order import look_counts, ordered  # noqa: E402
 from pipelines.planning.textbook import seen_by, textbook  # noqa: E402
 from pipelines.schedule.timing import spent  # noqa: E402
+from pipelines.stages.fit import LONG_S  # noqa: E402
 from pipelines.stages.uncertainty.bias_measurands import BiasNoise, bias_measurands  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
 from schemas.simulation import Simulation  # noqa: E402
@@ -367,12 +368,13 @@ def errors_of(course: PlanContext, preset: Preset, options: argparse.Namespace) 
     found = fit_lot_with_wander(course.recipe.effects, state, mean, error)
     fit, level = found.fit, np.sqrt(np.mean(error**2, axis=1) * found.lack_of_fit)
     spread = np.sqrt(np.diagonal(fit.covariance, axis1=-2, axis2=-1))
+    goes_on = found.walk_shown or float(np.ptp(np.asarray(state.time)[0])) >= LONG_S
     stated = bias_measurands(
         BiasNoise(
             error=spread[..., 0],
             gain=found.gain[:, :, 0],
             flicker=level * found.flicker,
-            carried=level * found.walk,
+            carried=level * found.walk * goes_on,
             excess=np.zeros_like(level),
             time=np.asarray(state.time)[0],
             every=np.asarray(state.time)[0],
