@@ -188,6 +188,7 @@ def test_what_no_effect_is_like_is_said_with_its_map(tmp_path: Path, monkeypatch
     assert discovered_before(Archive(str(made.folder))) == [("DEMO", 1)]
 
 
+@pytest.mark.slow
 def test_a_thermometer_that_is_off_in_one_soak_is_no_effect_of_the_sensors(tmp_path: Path) -> None:
     """It reads 0.4 K too much in the cold; the devices' biases follow their temperature by 40 µg/K rms, either way."""
 

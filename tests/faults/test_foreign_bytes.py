@@ -13,7 +13,7 @@ from long_suites import rounds
 
 HERE = Path(__file__).parent
 SEED = 20261122
-FEW, MANY = 60, rounds(4000, 10_000)
+FEW, MANY = 30, rounds(4000, 10_000)
 HANG_S = 120.0  # of wall time without a word from the worker, on a machine that others use as well
 LONGEST_MESSAGE = 1000
 

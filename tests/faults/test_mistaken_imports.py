@@ -11,7 +11,7 @@ from pipelines.importers.mapping import build
 from pipelines.importers.record import imported
 from schemas.errors import TumblelineError
 
-FEW, MANY, SEED = 60, 300, 5_611_072
+FEW, MANY, SEED = 30, 300, 5_611_072
 G = recordings.G
 SIZES = {"g": 1.0, "mg": 1e3, "m/s^2": G}
 

@@ -51,6 +51,7 @@ def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) 
     assert float(np.mean(pool().carried(result.lots, driver, effect) > 0.0)) > 0.6
 
 
+@pytest.mark.slow
 def test_an_effect_in_the_model_of_every_lot_leaves_nothing_of_it() -> None:
     result = archive("third_order", "wafer")
     assert result.alarms

@@ -203,6 +203,7 @@ def test_other_columns_and_units_are_recognised_or_stated(
     assert "sensitivity 0.0700" in text
 
 
+@pytest.mark.slow
 def test_radians_that_are_called_degrees_are_told(tmp_path: Path) -> None:
     words = sweep(tmp_path, OWN, form="u rad")
     assert "add --unit-of phase=rad" in text_of(*words, status=1)

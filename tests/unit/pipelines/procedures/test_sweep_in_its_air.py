@@ -46,6 +46,7 @@ def judged(rows: pd.DataFrame) -> TransferDiagnosis:
 WARM = {"other_temperatures_C": [-40.0, 85.0]}
 
 
+@pytest.mark.slow
 def test_damping_that_follows_the_viscosity_of_its_gas_is_recognised_and_its_share_is_right() -> None:
     found = judged(swept({"kind": "gas_film", "figures": {"vented": 0.0, "gap_um": 50.0, "share": 0.8}}, **WARM))
     assert found.adequate is False
@@ -66,6 +67,7 @@ def test_a_spring_that_softens_is_recognised_in_the_natural_frequency() -> None:
     assert abs(value) > 5.0 * error
 
 
+@pytest.mark.slow
 def test_a_vented_film_is_recognised_by_the_pressure() -> None:
     rows = swept({"kind": "gas_film", "figures": {"gap_um": 2.0}}, pressures_hPa=[300.0, 100.0])
     assert sorted(rows["pressure_hPa"].fillna(1013.0).round(-1).unique()) == [100.0, 300.0, 1010.0]
