@@ -46,7 +46,6 @@ def judged(rows: pd.DataFrame) -> TransferDiagnosis:
 WARM = {"other_temperatures_C": [-40.0, 85.0]}
 
 
-@pytest.mark.slow
 def test_damping_that_follows_the_viscosity_of_its_gas_is_recognised_and_its_share_is_right() -> None:
     found = judged(swept({"kind": "gas_film", "figures": {"vented": 0.0, "gap_um": 50.0, "share": 0.8}}, **WARM))
     assert found.adequate is False
