@@ -159,7 +159,7 @@ class Pool:
     def _fitted(self, driver: str, effect: str, sums: DriverSums) -> tuple[Array, Array]:
         """Sizes (axes, levels, p) of a driver's levels, the columns of an effect together, and their covariances."""
         here, centred = self._everywhere(effect), about_common(driver, sums)
-        inner = self._inner(sums, effect, _SEEN)
+        inner = self._inner(sums, effect)
         root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
         scale = over(np.ones_like(root), root)
         sizes = scale * (over(centred[:, here], root) @ inner)
@@ -323,14 +323,18 @@ class Pool:
         """Hypotheses of an effect, (axes·p,), axis by axis."""
         return (np.arange(self.axes)[:, None] * len(self.columns) + self.places(effect)).reshape(-1)
 
-    def _inner(self, sums: DriverSums, effect: str, least: float) -> Array:
-        """Inverse of the correlations of an effect's hypotheses, (axes·p, axes·p), for a driver."""
+    def _inner(self, sums: DriverSums, effect: str) -> Array:
+        """Inverse of the correlations of an effect's hypotheses, (axes·p, axes·p), for a driver.
+
+        Combinations that errors of the station, or rounding of what is kept, leave nothing of do not count: of a large effect
+        they would explain three times what there is.
+        """
         at, here = self.places(effect), self._everywhere(effect)
         if sums.mixed:
             among = np.asarray(block_diag(*self.inside[:, at[:, None], at]), dtype=np.float64)
         else:
             among = self.lot[np.ix_(here, here)]
-        return np.linalg.pinv(among, rcond=least, hermitian=True).astype(np.float64)
+        return np.linalg.pinv(among, rcond=_SEEN, hermitian=True).astype(np.float64)
 
     def scores(self, name: str, sums: DriverSums) -> dict[str, float]:
         """Score of every effect for a driver."""
@@ -346,7 +350,7 @@ class Pool:
         here = self._everywhere(effect)
         info = sums.information[:, here]
         z = over(about_common(name, sums)[:, here], np.sqrt(np.maximum(info, 0.0)))
-        return float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect, 1e-6), z)), (info > 0.0).sum(axis=0)
+        return float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
 
     def _rank(self, effect: str, behind: float, top: float) -> tuple[bool, int, int, float]:
         """Order in a class: of those that inexact columns do not tell apart the simplest is first."""
