@@ -75,7 +75,7 @@ def test_revoked_coefficients_leave_the_house_only_when_they_are_asked_for(run: 
     assert "REVOKED (dropped * / on the floor) */" in header
     typed("certificate", "revoke", "A2", "--reason", "wrong reference")
     assert "was revoked (" in str(typed("export", run.id).exception)  # no unit is left
-    typed("certificate", "issue", run.id, "--units", "A1")
+    typed("certificate", "issue", run.id, "--units", "A1", "--reason", "dropped on foam")
     assert units(typed, run)["A1"]["certificate"]["certificate"] == "A1/3"
 
 
