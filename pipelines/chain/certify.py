@@ -25,7 +25,7 @@ from pipelines.chain.certifiable import (
     refuse_unstated,
     withdrawn,
 )
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse, did_you_mean
 

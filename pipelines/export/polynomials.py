@@ -18,7 +18,7 @@ from pipelines.certificates import validity
 from pipelines.certificates.ledger import stated
 from pipelines.export.unit_noise import UnitNoise, noise_of_units
 from pipelines.importers.exchange import refuse_other_procedures
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 from pipelines.tables.calibration import Calibration, read_calibration
 from schemas.errors import RecipeInvalid, WrongUse
 from stations.plant.preset import load_preset
