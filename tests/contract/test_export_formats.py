@@ -71,7 +71,6 @@ def test_a_unit_that_failed_is_told_from_one_that_passed(name: str) -> None:
     marks = (
         b"FAILED: grade none, outside its limits: Rms residual of the fit: 1.2",
         b'"outcome": "fail"',
-        b"FAILED: grade".decode().encode("utf-16-le"),
     )
     assert any(mark in content for mark in marks for content in files.values())
     assert not any(mark in content for mark in marks for content in passed.values())

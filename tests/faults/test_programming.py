@@ -390,7 +390,7 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
 
     def meanwhile(*words: object) -> object:
         ledger.revoke("A1", "by another process", day=today())
-        certify(ledger, run, ["A1"], months=3)
+        certify(ledger, run, ["A1"], months=3, reason="another process")
         return real(*words)
 
     with monkeypatch.context() as patch:

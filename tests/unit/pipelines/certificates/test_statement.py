@@ -104,7 +104,7 @@ def test_failed_units_are_marked_in_their_files_and_no_certificate_is_offered_fo
     (tmp_path / "strict.toml").write_text(STRICT, encoding="utf-8")
     failed = again(run.archive, run.id, change_from_options(limits=str(tmp_path / "strict.toml"))).new
     px4 = ("--format", "px4", "--set", "nominal=256000", "--units", "A1", "--set", "device_id=1310988")
-    mark = "FAILED: grade none, outside its limits: Rms residual of the fit: "
+    mark = "FAILED: grade consumer, outside its limits: Rms residual of the fit: "
     for words in (px4, ("--format", "csv"), ("--format", "c")):
         done = typed("export", failed, "--include", "failed", *words)
         assert mark in done.stdout, (words, done.stderr)
