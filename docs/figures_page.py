@@ -31,7 +31,8 @@ def page() -> str:
 
 
 def _row(kind: FigureKind) -> str:
-    return f"| `{kind.name}` | {kind.unit} | {kind.meaning} | {kind.missing(EMPTY)} |"
+    meaning = kind.meaning.replace("|", "\\|")  # the magnitude |a|, in a table
+    return f"| `{kind.name}` | {kind.unit} | {meaning} | {kind.missing(EMPTY)} |"
 
 
 if __name__ == "__main__":

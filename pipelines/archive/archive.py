@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,16 +19,24 @@ from pipelines.archive.listing import RunInfo, infos_of
 from pipelines.archive.packed_path import with_packs
 from pipelines.archive.provenance import provenance
 from pipelines.archive.records import Records
-from pipelines.archive.run import START, Run
+from pipelines.archive.run import START, Run, names_in
 from pipelines.archive.signatures import key_place
 from pipelines.archive.store import Place, address_of, place_of
-from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
+from schemas.errors import ArchiveUnusable, WrongUse, close_matches, did_you_mean
 
 if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT = 1
 PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")  # a name that cannot lead elsewhere
+
+
+FEW = 5  # names in a message
+
+
+def _few(names: Sequence[str]) -> str:
+    more = f" and {len(names) - FEW} more ('tumbleline list')" if len(names) > FEW else ""
+    return ", ".join(names[:FEW]) + more
 
 
 def default_root() -> Place:
@@ -114,12 +122,18 @@ class Archive:
         if len(matches) == 1:
             return Run(self, matches[0])
         where = f"archive {self.root}"
-        if matches:
-            message = (
-                f"{where}: '{name}' begins {len(matches)} runs ({', '.join(matches)}), one is needed; write more of it"
+        if not matches and (lost := [one for one in self.without_start(set(ids)) if name and one.startswith(name)]):
+            raise ArchiveUnusable(
+                f"{where}: folder runs/{lost[0]} has no {START}; restore it from a copy, see 'tumbleline verify'"
             )
+        if matches:
+            begun = f"'{name}' begins {len(matches)} runs ({_few(matches)})"
+            message = f"{where}: {begun}, one is needed; write more of it"
         elif ids:
-            message = f"{where}: no run is called '{name}'; {did_you_mean(name, ids)}"
+            close = close_matches(name, ("latest", *ids))
+            message = (
+                f"{where}: no run is called '{name}'; {did_you_mean(name, close) if close else f'known: {_few(ids)}'}"
+            )
         else:
             message = f"{where}: there is no run yet; make one with 'tumbleline run'"
         raise WrongUse(message)
@@ -132,6 +146,13 @@ class Archive:
         """Every run, in the order of their start."""
         infos = infos_of(self.root, [Run(self, run_id) for run_id in self.run_ids()])
         return sorted(infos, key=lambda info: (info.started, info.id))
+
+    def without_start(self, known: Collection[str]) -> list[str]:
+        """Folders with files of a run, whose ``run.json`` is gone: no command can read them; ``known`` are runs that have it."""
+        found = ((one, names_in(self.root / "runs" / one)) for one in self.run_ids() if one not in known)
+        return [
+            one for one, names in found if START not in names and any(n.endswith((".json", ".parquet")) for n in names)
+        ]
 
     def run_ids(self) -> list[str]:
         """Names of the runs in alphabetical order; a run that is being created at the moment may be among them."""

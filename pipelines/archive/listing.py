@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pipelines.archive import derived, files
 from pipelines.archive.keys import digest
-from pipelines.archive.run import SEALED, Run, names_in, stages_of
+from pipelines.archive.run import SEALED, Run, lost_files, names_in, stages_of
 from pipelines.archive.store import ObjectPath, Place
 from schemas.errors import ArchiveUnusable
 
@@ -29,6 +29,7 @@ class RunInfo:
     passed: Annotated[int | None, "units that passed; null before the grades are there"] = None
     graded: Annotated[int | None, "units with a decision; null before the grades are there"] = None
     verdict: Annotated[str | None, "adequate, not adequate, not judged; null without a model to judge"] = None
+    lost: Annotated[str, "files of a finished run that are not there, with commas between; empty where all are"] = ""
 
 
 def info_of(run: Run) -> RunInfo | None:
@@ -52,6 +53,7 @@ def info_of(run: Run) -> RunInfo | None:
         passed=None if outcomes is None else outcomes.count("pass"),
         graded=None if outcomes is None else len(outcomes),
         verdict=next(iter(_texts(run, names, VERDICT, "verdict") or ()), None),
+        lost=", ".join(lost_files(run.path, names)),
     )
 
 

@@ -36,6 +36,18 @@ def names_in(folder: Place) -> set[str]:
 START = "run.json"
 
 
+def lost_files(folder: Place, names: set[str]) -> list[str]:
+    """Files of a run that its seal names and that are not there; none of a run without a seal, which is not finished.
+
+    names : of the files in the folder
+    """
+    if SEALED not in names:
+        return []
+    named = {name.rpartition("/")[2] for name in files.read_json(folder / SEALED)["files"] if name.startswith("runs/")}
+    tables = {f"{name.removesuffix('.json')}.parquet" for name in named - {START, "report.json"}}
+    return sorted((named | tables) - names)
+
+
 class Rooted(Protocol):
     """The archive as its runs know it: a place."""
 

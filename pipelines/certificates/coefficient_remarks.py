@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pipelines.archive import Run, files
+from pipelines.archive.run import names_in
 from pipelines.archive.signatures import BAD, GOOD, UNSIGNED, check, public_keys
 from pipelines.archive.store import Place, first_line
 from pipelines.certificates.entries import folder_of
@@ -45,6 +46,13 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
         f"{'not signed' if state == UNSIGNED else 'signed with a key that is not the own'}: {', '.join(names)}"
         for state, names in sorted(by_state.items())
     ]
+
+
+def changed_tables(run: Run) -> list[str]:
+    """Tables of the result of a run that are not as their manifests say, by their hashes."""
+    names = names_in(run.path)
+    there = [name for name in TABLES if {f"{name}.parquet", f"{name}.json"} <= names]
+    return [name for name in there if files.sha256(run.path / f"{name}.parquet") != run.manifest(name)["sha256"]]
 
 
 def library_remarks(run: Run) -> list[str]:

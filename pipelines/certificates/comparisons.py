@@ -91,7 +91,8 @@ class Comparisons:
         for row in self._models(unit, number):
             p = float(row["p_value"])
             if row["verdict"] == NOT_JUDGED and row["model"] != "sine over the angle":
-                return f"{name}: the model {row['model']} cannot be judged ({row['reason']}); measure more frequencies"
+                again = "measure again" if part.kind == "shock" else "measure more frequencies"
+                return f"{name}: the model {row['model']} cannot be judged ({row['reason']}); {again}"
             if row["verdict"] != ADEQUATE and (row["reason"] or not passes(p, self._least)):
                 lacks = f", {row['reason']}: name it in effects of the recipe" if row["reason"] else ""
                 return f"{name}: the model {row['model']} is NOT ADEQUATE (p {equal(p)}){lacks}"

@@ -12,6 +12,8 @@ from schemas.errors import ArchiveUnusable
 
 SCHEMA = 1
 STATIC = "static"
+WRITING = "coefficients are written into the device"
+"""The reason of a revocation that lasts until the memory of a unit is verified."""
 Action = Literal["certify", "supersede", "revoke"]
 
 

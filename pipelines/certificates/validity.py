@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from pipelines.certificates.days import today
 from pipelines.certificates.documents import CalibrationDocument
-from pipelines.certificates.entries import LedgerEntry
+from pipelines.certificates.entries import WRITING, LedgerEntry
 from schemas.errors import WrongUse
 
 
@@ -66,6 +66,11 @@ class Calibration:
         if self.ended_by is None:
             return "valid"
         return "revoked" if self.ended_by.action == "revoke" else "superseded"
+
+    @property
+    def withdrawn(self) -> bool:
+        """Whether it was revoked, and not only while its coefficients were written into the device."""
+        return self.state == "revoked" and self.reason != WRITING
 
     @property
     def reason(self) -> str:

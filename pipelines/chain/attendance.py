@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.jobs.seating import disagreements
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 from pipelines.tables.frames import rows_of
 from schemas.errors import OperatorNeeded
 

@@ -68,6 +68,19 @@ def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
             )
 
 
+def withdrawn(ledger: Ledger, event: LedgerEntry) -> str:
+    """Why a unit is not certified again without a reason of its own: its last certificate of this run was revoked; else empty."""
+    alike = [
+        one for one in ledger.calibrations(event.serial) if one.run == event.run and event.ends_others_of(one.event)
+    ]
+    if not alike or not alike[-1].withdrawn:
+        return ""
+    return (
+        f"certificate {alike[-1].certificate} of this run was revoked ({alike[-1].reason}); measure the unit again, or, if the "
+        f"revocation was an error, certify it with --units {event.serial} --reason TEXT"
+    )
+
+
 def refuse_overdue(run: Run) -> None:
     """Refuse a run whose station had a reference standard that was due before it measured."""
     about = run.about

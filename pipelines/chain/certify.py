@@ -23,8 +23,9 @@ from pipelines.chain.certifiable import (
     refuse_two_at_once,
     refuse_unsound,
     refuse_unstated,
+    withdrawn,
 )
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse, did_you_mean
 
@@ -77,6 +78,7 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     units : serials; every unit of the run that passed where empty.
     start : first day, today where empty.
     until : day after the last, so many ``months`` after the first where empty, as many as are allowed where that is 0.
+    reason : kept with the events; units whose certificate of this run was revoked are certified again only by name, with one
     supersede : end calibrations that begin later and overlap, too.
     keys : public keys that are trusted; the own where None. Where there are any the run must be signed by one.
 
@@ -99,6 +101,12 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     refuse_period(run, first, last)
     # one at a time from here on: of two who certify one serial at the same moment the second is refused, and learns of the first
     with alone(ledger.root / FOLDER, wait=True):
+        if not (units and reason.strip()):
+            result.left_out |= {one.serial: why for one in proposals if (why := withdrawn(ledger, one))}
+            proposals = [one for one in proposals if one.serial not in result.left_out]
+            if units and result.left_out:
+                serial, why = next(iter(result.left_out.items()))
+                raise WrongUse(f"certify: unit {serial} of run {run.id}: {why}")
         for proposal in proposals:
             refuse_two_at_once(ledger, run, proposal.serial)
             if not supersede:

@@ -10,7 +10,7 @@ from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import STYLES, give, print_table, say, short
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 
 if TYPE_CHECKING:
     from rich.text import Text

@@ -56,6 +56,7 @@ def command(
     from pipelines.parallel import processors
 
     store, scope = Archive(archive), scope_of(since, until, device, station)
+    store.refuse_none()
     count = workers or processors()
     audited = audit(store, load_rules(rules), scope, distribute=on_dask(dask, count), workers=count)
     _refuse_nothing(audited, str(store.root))

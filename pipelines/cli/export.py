@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pipelines.archive import Archive, Run, files
 from pipelines.cli.export_waveforms import write_record
+from pipelines.cli.next_commands import archive_words, command_line
 from pipelines.cli.options import (
     ArchiveOption,
     FilterOption,
@@ -140,7 +141,7 @@ def command(
     if low_pass or given.get("track"):
         receiver = replace(receiver, firmware=_firmware(source, chosen, form, (low_pass, rate), given))
     contents = export_files(form, chosen, source.id, receiver)
-    _print_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
+    _print_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]), archive)
     _write(contents, output)
 
 
@@ -199,7 +200,9 @@ def _write(contents: dict[str, bytes], output: Path | None) -> None:
         remark(f"export: {len(contents)} files in {output}")
 
 
-def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
+def _print_certificates(
+    run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str], archive: str | None
+) -> None:
     """Print the state of the certificates of these coefficients on standard error."""
     from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.certificates.days import today
@@ -208,18 +211,24 @@ def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Se
 
     given, day = {c.unit for c in chosen}, today()
     lines = [f"left out: {unit}, {one.sentence()}" for unit, one in revoked_units(run).items() if unit not in given]
-    lines += [f"{c.unit}: {c.certified}" for c in chosen if c.certificate is not None and not c.certificate.holds(day)]
+    lines += [
+        f"{c.unit}: {c.certified}"
+        for c in chosen
+        if c.certificate is not None and not c.reasons and not c.certificate.holds(day)
+    ]
     terms = archived_terms(run.about)
     if terms is not None and terms.follows is not None:
         lines.append(
             f"the coefficients hold at {terms.follows.nominal_V:g} V of supply: multiply the raw output by that over the "
             "measured supply before they are applied, or read it with a converter that is referred to the supply"
         )
-    bare = [c.unit for c in chosen if c.certificate is None]
+    lines += [f"{c.unit} {c.certified}" for c in chosen if c.reasons]
+    bare = {c.unit: c.outcome for c in chosen if c.certificate is None and not c.reasons}
     if bare:
-        lines.append(
-            f"not certified: {', '.join(bare)}; 'tumbleline certificate issue {run.id}' gives them a period of validity"
-        )
+        lines.append(f"not certified: {', '.join(bare)}")
+    if "pass" in bare.values():
+        issue = command_line("certificate", "issue", run.id, *archive_words(archive))
+        lines[-1] += f"; '{issue}' gives them a period of validity"
     lines += [*library_remarks(run), *signers]
     for line in lines:
         remark(f"export: {line}")

@@ -8,7 +8,7 @@ from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.printing import conclude, error_console, remark, say
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 

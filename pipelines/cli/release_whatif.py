@@ -9,7 +9,7 @@ from pipelines.cli import options
 from pipelines.cli.inputs import distribution
 from pipelines.cli.options import argument
 from pipelines.cli.printing import conclude, error_console, print_table, say, short
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 
 SHOWN = 12
 

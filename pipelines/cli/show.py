@@ -9,10 +9,11 @@ import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
+from pipelines.archive.run import lost_files, names_in
 from pipelines.certificates import Calibration
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import cell, error_console, give, print_json, print_table, remark, say
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.printing import cell, conclude, error_console, give, print_json, print_table, remark, say
+from schemas.errors import DONE, PART_FAILED, ArchiveUnusable, WrongUse
 
 PART = "Results"
 ORDER = 320
@@ -45,7 +46,7 @@ def command(
 ) -> None:
     """Show the result of a run, one of its tables, or the calibration of a unit that is valid on a date (default: today).
 
-    Exit status 1: no calibration of the unit is valid on that date.
+    Exit status 1: no calibration of the unit is valid on that date, or a table of the result has changed since it was written.
     """
     store = Archive(archive)
     if at or known or (not report and _is_unit(store, run)):
@@ -74,8 +75,10 @@ def _is_unit(archive: Archive, name: str) -> bool:
 
 
 def _show_run(run: Run, *, as_json: bool) -> None:
+    from pipelines.certificates.coefficient_remarks import changed_tables
     from pipelines.cli.summary import print_summary, summary
 
+    _refuse_lost(run, lost_files(run.path, names_in(run.path)))
     tables = run.tables()
     print_remarks(run, [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])])
     document = {
@@ -94,12 +97,28 @@ def _show_run(run: Run, *, as_json: bool) -> None:
             say(f"run {run.id} is not finished ({stored} stored); give its 'tumbleline run' again to continue")
         say(f"tables  {', '.join(tables)}")
 
-    give(document, show, as_json=as_json)
+    changed = changed_tables(run)
+    for name in changed:
+        remark(
+            f"show: {run.path / name}.parquet has changed since it was written (its hash is not its manifest's); what is "
+            f"shown is of the grades and figures as they were decided. Restore it from a copy, see 'tumbleline verify {run.id}'"
+        )
+    conclude(document, show, as_json=as_json, passed=not changed)
+
+
+def _refuse_lost(run: Run, lost: Sequence[str]) -> None:
+    """Refuse to show what a finished run has lost: it would look as if it had not been finished."""
+    if lost:
+        raise ArchiveUnusable(
+            f"show: run {run.id} is finished, and {', '.join(lost)} of it {'is' if len(lost) == 1 else 'are'} not there; restore "
+            f"from a copy, see 'tumbleline verify {run.id}'"
+        )
 
 
 def _show_table(run: Run, name: str, *, as_json: bool) -> None:
     from pipelines.tables.frames import rows_of
 
+    _refuse_lost(run, [file for file in lost_files(run.path, names_in(run.path)) if file.startswith(f"{name}.")])
     frame = run.table(name)
     if as_json:
         print_json({"run": run.id, "table": name, "rows": rows_of(frame)})
@@ -180,7 +199,8 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
             say(f"  code     {made['made']['code'][:16]}… with {libraries}")
     lines = [
-        [one.certificate, one.event.covers, one.start, one.until, one.state, one.run, _why(one)] for one in history
+        [one.certificate, one.event.covers, one.start, one.until, _state(one, day), one.run, _why(one)]
+        for one in history
     ]
     print_table(["certificate", "covers", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []
@@ -191,6 +211,11 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
             [r["effect"], r["axis"], r["name"], *rounded(r["value"], r["standard_error"]), r["unit_text"]] for r in rows
         ]
         print_table(["effect", "axis", "name", "value", "standard error", "unit"], cells)
+
+
+def _state(calibration: Calibration, day: str) -> str:
+    """Its state on a day."""
+    return "expired" if calibration.state == "valid" and day >= calibration.until else calibration.state
 
 
 def _why(calibration: Calibration) -> str:

@@ -14,7 +14,7 @@ from pipelines.tables.prior import prior_document, prior_sentence
 
 SHOWN = (
     ("residual_rms_ug", "fit\nµg"),
-    ("verification_norm_ug", "verify\nµg"),
+    ("verification_norm_ug", "verify |a|\nµg"),
     ("bias_error_ug", "error\nµg"),
     ("bias_error_period_ug", "period\nµg"),
     ("velocity_random_walk_ug_rtHz", "N\nµg/√Hz"),
@@ -30,8 +30,8 @@ NOISE_ONLY = (
 
 LEGEND = {
     "residual_rms_ug": "fit: rms residual of the dwells that are fitted",
-    "verification_norm_ug": "verify: largest error in a pose not used, mean of its dwells",
-    "bias_error_ug": "error: rms of the worst axis in these poses",
+    "verification_norm_ug": "verify: largest error of |a|, the magnitude of gravity, in a pose not used, mean of its dwells",
+    "bias_error_ug": "error: rms of the worst axis in these poses, so it may exceed verify",
     "bias_error_period_ug": "period: 95 % bound of the largest rms error of an axis at the end of the period of validity",
 }
 NOISE_LEGEND = "N, B: noise of the worst axis, an upper limit where a term is not identified"

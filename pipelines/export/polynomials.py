@@ -18,6 +18,7 @@ from pipelines.certificates import validity
 from pipelines.certificates.ledger import stated
 from pipelines.export.unit_noise import UnitNoise, noise_of_units
 from pipelines.importers.exchange import refuse_other_procedures
+from pipelines.stages.figures import plain_reason
 from pipelines.tables.calibration import Calibration, read_calibration
 from schemas.errors import RecipeInvalid, WrongUse
 from stations.plant.preset import load_preset
@@ -36,6 +37,7 @@ class UnitCalibration:
     bias : (4, m), output unit per K^k, coefficients of θ⁰ … θ³, of the m axes that have an output
     response : (4, m, 3), output unit per g and K^k
     left_out : effects of the model that have no place in this form
+    reasons : why it failed its limits; empty where it passed
     certificate : that the unit has for this run; None where it was not certified
     noise : terms of its static record; None without one
     full_scale : largest excursion of the output from 0 g, output unit; None where it is not recorded
@@ -57,6 +59,7 @@ class UnitCalibration:
     nominal: float | None = None
     axes: tuple[int, ...] = ALL_AXES
     dwells: pd.DataFrame = field(default_factory=pd.DataFrame)
+    reasons: str = ""
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -82,12 +85,18 @@ class UnitCalibration:
 
     @property
     def certified(self) -> str:
-        """State of the certificate, in one line."""
-        return "not certified" if self.certificate is None else self.certificate.sentence()
+        """That the unit failed, and why, and the state of the certificate, in one line."""
+        return standing(self.grade, self.reasons, self.certificate)
 
     def correct(self, output: Array, temperature: float) -> Array:
         """Specific force (n, 3) in g for outputs (n, 3), as firmware computes it."""
         return corrected_output(self.bias, self.response, output, temperature)
+
+
+def standing(grade: str, reasons: str, certificate: validity.Calibration | None) -> str:
+    """What a file says of a unit in one line: that it failed, and why; the state of its certificate."""
+    failed = f"FAILED: grade {grade}, outside its limits: {plain_reason(reasons)}; " if reasons else ""
+    return failed + ("not certified" if certificate is None else certificate.sentence())
 
 
 def corrected_output(bias: Array, response: Array, output: Array, temperature: float) -> Array:
@@ -119,12 +128,12 @@ def unit_calibrations(
     fitted = dwells[dwells["kind"] != "verification"] if "kind" in dwells else dwells
     calibrations: list[UnitCalibration] = []
     for unit in chosen:
-        outcome, grade = grades.get(unit, (UNGRADED, "none"))
+        outcome, grade, reasons = grades.get(unit, (UNGRADED, "none", ""))
         calibrations.append(
             UnitCalibration(
                 unit, outcome, grade, out_unit, *polynomials(calibration, unit), _temperatures(dwells, unit), left_out,
                 certificates.get(unit), noise.get(unit), full_scale.get(unit), nominal, calibration.axes,
-                fitted[fitted["unit"].astype(str) == unit],
+                fitted[fitted["unit"].astype(str) == unit], reasons,
             )
         )  # fmt: skip
     return calibrations
@@ -143,8 +152,8 @@ def refuse_fewer_axes(units: Sequence[UnitCalibration], what: str) -> None:
 UNGRADED = "no limits"
 """The outcome of a unit that was fitted and compared with no limits: that of an import."""
 
-Chosen: TypeAlias = "tuple[Sequence[str], dict[str, tuple[str, str]], Mapping[str, validity.Calibration]]"
-"""Units to export; outcome and grade, and certificate by unit."""
+Chosen: TypeAlias = "tuple[Sequence[str], dict[str, tuple[str, str, str]], Mapping[str, validity.Calibration]]"
+"""Units to export; outcome, grade and reasons, and certificate by unit."""
 
 
 def _exportable(run: Run, serials: tuple[str, ...], *, failed: bool, revoked: bool) -> Chosen:
@@ -166,7 +175,8 @@ def graded_units(run: Run, serials: tuple[str, ...], *, failed: bool, revoked: b
     certificates = stated(run, chosen)
     if not revoked:
         chosen = _not_revoked(run, chosen, certificates, named=bool(serials))
-    return chosen, {u: (str(table.loc[u, "outcome"]), str(table.loc[u, "grade"])) for u in chosen}, certificates
+    rows = table.loc[chosen, ["outcome", "grade", "reasons"]].fillna("").astype(str)
+    return chosen, dict(zip(chosen, rows.itertuples(index=False, name=None), strict=True)), certificates
 
 
 def _imported(run: Run, serials: tuple[str, ...]) -> Chosen:

@@ -13,7 +13,7 @@ from inertial.errors import NotIdentified
 from pipelines.archive import Run
 from pipelines.export.formats.teds import axis_lines, heading, refuse_digital, serial_numbers, with_period
 from pipelines.export.omissions import comment
-from pipelines.export.polynomials import graded_units
+from pipelines.export.polynomials import graded_units, standing
 from pipelines.export.teds import (
     HIGH_PASS,
     POLE,
@@ -54,7 +54,7 @@ def swept_files(
     WrongUse
         No unit passed, its output is not in V, it has too few points, or none at a temperature that template 25 states.
     """
-    chosen, _, certificates = graded_units(run, serials, failed=failed, revoked=revoked)
+    chosen, grades, certificates = graded_units(run, serials, failed=failed, revoked=revoked)
     points, readings = run.table("procedure_points"), run.table("readings").set_index("unit")
     rows = points[(points["procedure"] == "sweep") & (points["series"] == "response") & np.isfinite(points["value"])]
     files: dict[str, bytes] = {}
@@ -63,8 +63,7 @@ def swept_files(
         refuse_digital(unit, str(readings.loc[[unit], "out_unit"].iloc[0]))
         certificate, serial = certificates.get(unit), serials_of[unit]
         own = with_period(unit, certificate, sheet)
-        certified = "not certified" if certificate is None else certificate.sentence()
-        text = heading(unit, certified, run.id, own, serial)
+        text = heading(unit, standing(*grades[unit][1:], certificate), run.id, own, serial)
         for name, axis in rows[rows["unit"] == unit].groupby("axis", sort=True):
             one, lines = swept_axis(unit, axis, AXES.index(str(name)))
             files[f"{unit}-{name}.teds"] = page(own, serial, one)

@@ -146,6 +146,11 @@ def lot_of(
         raise WrongUse(
             f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
         )
+    alike = [serial for serial in named if [other.lower() for other in named].count(serial.lower()) > 1]
+    if alike:
+        raise WrongUse(
+            f"lot: serials {' and '.join(alike)} differ in capitals alone, some disks keep one file for both; give one another"
+        )
     units = [Unit(serial=serial, slot=slot) for serial, slot in zip(named, slots or range(len(named)), strict=True)]
     try:
         chosen, axes = recipe.seed if seed is None else seed, recipe.sensor_axes

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.arrays import Array
+from inertial.dynamics.missing_effects import Judged
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from pipelines.tables.frames import rows_of
 from schemas.comparison import TERMS
@@ -143,8 +144,6 @@ def curve_results(curve: JudgedCurve, diagnosis: TransferDiagnosis, out_unit: st
 def transfer_curve(axis: str, diagnosis: TransferDiagnosis, frequency: Array) -> JudgedCurve:
     """The judged model of a transfer function, with the covariance of its parameters in their units."""
     fit = diagnosis.fit
-    missing = [" or ".join(one.effects) for one in diagnosis.classes]
-    reason = diagnosis.reason or (f"it lacks {', '.join(missing)}" if missing else "")
     per_unit = np.append(
         abs(fit.sensitivity), [v if p.log else 1.0 for p, v in zip(fit.parameters, fit.values, strict=True)]
     )
@@ -153,12 +152,18 @@ def transfer_curve(axis: str, diagnosis: TransferDiagnosis, frequency: Array) ->
         " + ".join(("sensitivity", *fit.effects)),
         verdict_word(diagnosis.adequate),
         fit.p_value,
-        reason,
+        reason_of(diagnosis),
         ("sensitivity", *(p.name for p in fit.parameters)),
         fit.covariance * np.outer(per_unit, per_unit),
         float(frequency.min()),
         float(frequency.max()),
     )
+
+
+def reason_of(diagnosis: Judged[Any]) -> str:
+    """What a model lacks, or why it cannot be judged; empty where neither is known."""
+    missing = [" or ".join(one.effects) for one in diagnosis.classes]
+    return diagnosis.reason or (f"it lacks {', '.join(missing)}" if missing else "")
 
 
 def verdict_word(verdict: bool | None) -> str:  # noqa: FBT001 - it is the verdict

@@ -203,7 +203,8 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         self, part: ShockPart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
     ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
         """Sensitivity by comparison, and the figures that it bears out; none without a comparison."""
-        return compared_results(part, figures, int((rows["series"] == "ratio").sum())), []
+        results = compared_results(part, figures, int((rows["series"] == "ratio").sum()))
+        return results, shock_records.judged_curves(rows, part) if results else []
 
     def verdict(self, part: ShockPart, rows: pd.DataFrame) -> str:
         """The verdict on the comparison of the waveforms; none without a comparison."""

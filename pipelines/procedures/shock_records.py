@@ -9,15 +9,17 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from inertial.dynamics import pulse_faults, pulses
+from inertial.dynamics.missing_effects import p_value
 from inertial.dynamics.pulses import Pulse
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.errors import NotIdentified
 from inertial.record_faults import clipped as at_extreme
 from pipelines.procedures import shock_figures
-from pipelines.procedures.compared import verdict_word
+from pipelines.procedures.compared import JudgedCurve, reason_of, verdict_word
 from pipelines.procedures.figures import diagnosis_texts, with_uncertainty
 from pipelines.procedures.recorded import Device, UnitRecord, numbers, point_rows
+from schemas.tables import NOT_JUDGED
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 DRAWN = 400  # points of a waveform in the picture
@@ -142,6 +144,19 @@ def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
         _last_judged.clear()
         _last_judged[key] = made
     return _last_judged[key]
+
+
+def judged_curves(rows: pd.DataFrame, part: Any) -> list[JudgedCurve]:
+    """The model of the waveforms with its verdict, which a certificate rests on; none where no waveforms are kept."""
+    try:
+        diagnosis = judged(rows, part)
+    except NotIdentified as problem:
+        return [JudgedCurve(part.axis, "of the waveforms", NOT_JUDGED, np.nan, str(problem))]
+    if diagnosis is None:
+        return []
+    model = " + ".join(("sensitivity", *diagnosis.fit.effects))
+    verdict = verdict_word(diagnosis.adequate)
+    return [JudgedCurve(part.axis, model, verdict, p_value(diagnosis.fit), reason_of(diagnosis))]
 
 
 def diagnosis_text(rows: pd.DataFrame, part: Any) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
 from pipelines.certificates import Ledger
 from pipelines.certificates.days import today
-from pipelines.certificates.entries import STATIC
+from pipelines.certificates.entries import STATIC, WRITING
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.programmed import TOP, add
 from pipelines.certificates.validity import Calibration
@@ -25,8 +25,6 @@ from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from stations import open_station
 
-REASON = "coefficients are written into the device"
-
 
 def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibration]]:
     """Slots and calibrations of the units of a run that passed, or of those named; the rules of an export hold."""
@@ -37,19 +35,13 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
     slots = {unit["serial"]: int(unit["slot"]) for unit in run.about["lot"]["units"]}
     once = tuple(dict.fromkeys(serials))  # a device that is named twice is written once
     calibrations = unit_calibrations(run, once, failed=False, revoked=True)
-    allowed = [unit for unit in calibrations if not _revoked(unit)]
-    revoked = [unit for unit in calibrations if _revoked(unit)]
+    allowed = [unit for unit in calibrations if unit.certificate is None or not unit.certificate.withdrawn]
+    revoked = [unit for unit in calibrations if unit.certificate is not None and unit.certificate.withdrawn]
     if revoked and (serials or not allowed):
         raise WrongUse(
             f"program: unit {revoked[0].unit}: {revoked[0].certified}, a valid calibration is needed; measure the unit again"
         )
     return [(slots[unit.unit], unit) for unit in allowed]
-
-
-def _revoked(unit: UnitCalibration) -> bool:
-    """Whether a calibration was revoked for another reason than that it was being written into the device."""
-    one = unit.certificate
-    return one is not None and one.state == "revoked" and one.reason != REASON
 
 
 def station_of(run: Run) -> StationConfig:
@@ -79,7 +71,7 @@ def program_run(
             calibration.until > day and calibration.start < calibration.until
             for calibration in ledger.calibrations(serial)
         ):
-            ledger.revoke(serial, REASON, day=day)
+            ledger.revoke(serial, WRITING, day=day)
         return len(ledger.events(serial)) + 1 if held[serial] is not None else 0
 
     choice = replace(choice, date=int(datetime.now(UTC).strftime("%Y%m%d")))
@@ -106,7 +98,7 @@ def _renewed(ledger: Ledger, run: Run, outcome: ProgrammingOutcome, day: str, un
     event = certify(ledger, run, [outcome.serial], day, until, reason=reason, keys=public_keys()).events[0]
     if event.sequence == outcome.certificate:
         return event.certificate
-    ledger.revoke(outcome.serial, REASON, day=day, certificate=event.sequence)
+    ledger.revoke(outcome.serial, WRITING, day=day, certificate=event.sequence)
     outcome.outcome, outcome.step = "failed", "certify"
     outcome.reason = (
         f"the device contains certificate number {outcome.certificate}, and another process wrote to the ledger, so that its "
@@ -152,7 +144,7 @@ def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None
     last = own[-1] if own else None
     if last is None or last.holds(day):
         return last
-    return last if last.ended_by is not None and last.ended_by.reason == REASON else None
+    return last if last.ended_by is not None and last.ended_by.reason == WRITING else None
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import pandas as pd
 
 from pipelines.archive import Run
 from pipelines.certificates.validity import Calibration
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 from pipelines.tables.frames import rows_of
 
 TABLES = (

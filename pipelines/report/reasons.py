@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 
 _VALUE = re.compile(r"(?P<before>.*?)(?P<value>[-\d.e+]+(?: ± [-\d.e+]+)?(?: [^\s,]+)?), (?P<limit>limit [^,;:]+)")
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")

@@ -162,7 +162,7 @@ def _verification(rows: pd.DataFrame) -> Plot:
         Trace("expected, k = 2", number, -expanded, "band", "muted", high=expanded),
         Trace("error", number, rows["error_ug"].to_numpy(float), role="ink", size=6.0, texts=texts),
     )
-    return Plot("poses not used by the fit", PlotAxis("verification dwell"), PlotAxis("error / µg"), traces)
+    return Plot("poses not used by the fit", PlotAxis("verification dwell"), PlotAxis("error of |a| / µg"), traces)
 
 
 def allan_plot(allan: pd.DataFrame, title: str = "") -> Plot:
@@ -226,7 +226,9 @@ def lot_chart(verification: pd.DataFrame, poses: pd.DataFrame, units: list[str],
         traces += [level(ends, sign * limit_ug, "limit", "limit") for sign in (-1.0, 1.0)]
     axis = PlotAxis("", names=tuple(units), low=-0.5, high=len(units) - 0.5)
     return Chart(
-        "Error on poses not used by the fit", (Plot("", axis, PlotAxis("error / µg"), tuple(traces)),), height=280
+        "Error on poses not used by the fit",
+        (Plot("", axis, PlotAxis("error of |a| / µg"), tuple(traces)),),
+        height=280,
     )
 
 

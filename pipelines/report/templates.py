@@ -1,6 +1,5 @@
 """The templates of pages, in this folder and in the modules of panels, with one style; reasons of decisions in words."""
 
-import re
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
@@ -10,7 +9,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 
 from inertial import effects
 from pipelines.report.interactive import scripts_hash
-from pipelines.stages.figures import UNITS, figure_label
+from pipelines.stages.figures import figure_label
 
 
 @cache
@@ -51,16 +50,3 @@ def fill(text: str, **values: Any) -> str:
 @cache
 def _compiled(text: str) -> Template:
     return _environment().from_string(text)
-
-
-def plain_reason(text: str) -> str:
-    """One reason, or several divided by ``; ``, in which a figure has its label instead of its id."""
-    return "; ".join(_plain(part) for part in text.split("; "))
-
-
-def _plain(part: str) -> str:
-    begin = re.match(r"\w+", part)
-    if begin is None or begin.group() not in UNITS:
-        return part
-    label, rest = figure_label(begin.group()), part[begin.end() :]
-    return f"{label[:1].upper()}{label[1:]}{'' if rest.startswith(':') else ':'}{rest}"

@@ -22,8 +22,8 @@ from pipelines.drawing import Chart, csv_text, plotly_figure
 from pipelines.drawing.chart import shortened
 from pipelines.drawing.picture import picture, safe_cell
 from pipelines.report.numbers import significant
-from pipelines.report.templates import plain_reason
 from pipelines.report.unit_panels.budget import without_nothing
+from pipelines.stages.figures import plain_reason
 from pipelines.workbench.services import requests
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import BackgroundJob, Jobs

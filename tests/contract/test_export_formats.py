@@ -65,6 +65,18 @@ def test_an_effect_without_a_place_is_named_or_refused(name: str) -> None:
 
 
 @each(FORMATS)
+def test_a_unit_that_failed_is_told_from_one_that_passed(name: str) -> None:
+    failed = replace(calibration("SN1"), outcome="fail", grade="none", reasons="residual_rms_ug: 1.2 µg, limit 1 µg")
+    files, passed = written(name, [failed]), written(name, [calibration("SN1")])
+    marks = (
+        b"FAILED: grade none, outside its limits: Rms residual of the fit: 1.2",
+        b'"outcome": "fail"',
+    )
+    assert any(mark in content for mark in marks for content in files.values())
+    assert not any(mark in content for mark in marks for content in passed.values())
+
+
+@each(FORMATS)
 def test_a_format_is_in_the_help_and_in_the_guide(name: str) -> None:
     shown = " ".join(CliRunner().invoke(app, ["export", "--help"], env={"COLUMNS": "160"}).stdout.split())
     own = FORMATS[name].__doc__

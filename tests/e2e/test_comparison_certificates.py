@@ -41,6 +41,7 @@ PARTS = {
     "bare": (SWEEP.format(effects='"second_order", "delay"'), "sweep_sensitivity_percent"),
     "transverse": ('kind = "transverse"\nscale = 0.007', "transverse_sensitivity_percent"),
     "shock": ('kind = "shock"\nscale = 0.007\nshocks = 2\nwindow_s = 5.0\nsettle_s = 5.0', "shock_sensitivity_percent"),
+    "bare_shock": ('kind = "shock"\nscale = 0.007\nshocks = 2\neffects = []', "shock_sensitivity_percent"),
     "tilt": ('kind = "tilt"', "tilt_linearity_ug"),
 }
 
@@ -156,6 +157,13 @@ def test_a_model_that_is_not_adequate_is_refused_with_what_it_lacks(certified: t
     assert (
         "sweep: the model sensitivity + second_order + delay is NOT ADEQUATE (p < 0.001), it lacks two_pole" in message
     )
+
+
+def test_a_shock_whose_waveforms_differ_is_refused_like_a_sweep(certified: tuple[Path, str]) -> None:
+    folder, _ = certified
+    run = run_of(folder, "bare_shock", "--units", "SF-1")
+    message = refused("certificate", "issue", run, "--archive", folder / "archive")
+    assert "shock: the model sensitivity is NOT ADEQUATE (p < 0.001), it lacks delay" in message
 
 
 @pytest.mark.slow

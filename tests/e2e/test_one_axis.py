@@ -199,7 +199,7 @@ def test_its_plan_speaks_of_one_axis(measured) -> None:
 def test_its_report_speaks_of_its_axis(measured) -> None:
     folder, runs = measured
     report = Archive(folder / "archive").run(runs["one"]).report.read_bytes().decode()
-    assert "error on poses not used, worst pose</td><td>all</td>" in report
+    assert "error of |a| on poses not used, worst pose</td><td>all</td>" in report
     for words in ("error of the magnitude", "difference between the magnitude", ">norm</td>"):
         assert words not in report
 

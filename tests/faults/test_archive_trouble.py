@@ -202,6 +202,55 @@ def test_a_run_json_that_was_lost_hides_no_other_run(root: Path) -> None:
     (root / "runs" / "lost" / "dwells.json").write_text("{}", encoding="utf-8")
     status, out, _ = given("list", "--json", "--archive", root)
     assert (status, len(json.loads(out)["runs"])) == (0, 1)
+    assert "folder runs/lost has no run.json" in given("list", "--archive", root)[2]
+    refused("folder runs/lost has no run.json; restore it from a copy", "show", "lost", "--archive", root)
     told_of = json.loads(given("verify", "--json", "--archive", root)[1])
     assert [(f["kind"], f["path"]) for f in told_of["findings"]] == [("missing", "runs/lost/run.json")]
     assert told_of["remarks"] == ["runs/empty holds no run: its writer was killed, or has just started"]
+
+
+def test_a_finished_run_that_lost_a_table_is_not_taken_for_an_unfinished_one(root: Path) -> None:
+    run = Archive(root).run("latest")
+    for name in ("grades", "verdict"):
+        place = run.path / f"{name}.parquet"
+        data = place.read_bytes()
+        place.unlink()
+        status, out, _ = given("list", "--archive", root)
+        assert (status, "files missing" in out, "not graded" in out) == (1, True, False)
+        told = f"{name}.parquet not there; restore from a copy, see 'tumbleline verify {run.id}'"
+        assert told in " ".join(out.split())
+        for words in (("show", "latest"), ("show", "latest", name)):
+            refused(f"run {run.id} is finished, and {name}.parquet of it is not there", *words, "--archive", root)
+        assert given("show", "latest", "figures", "--archive", root)[0] == 0
+        place.write_bytes(data)
+
+
+def test_show_says_that_a_table_of_the_result_has_changed(root: Path) -> None:
+    run = Archive(root).run("latest")
+    for name in ("coefficients", "covariance"):
+        place = run.path / f"{name}.parquet"
+        data = place.read_bytes()
+        assert given("show", "latest", "--archive", root)[::2] == (0, "")
+        place.write_bytes(data + b"x")
+        status, out, message = given("show", "latest", "--archive", root)
+        assert (status, "passed" in out) == (1, True)
+        assert f"{name}.parquet has changed since it was written" in message
+        place.write_bytes(data)
+
+
+def test_a_place_without_an_archive_is_not_an_archive_without_runs(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    for place in (tmp_path / "other", tmp_path / "none"):
+        for command in ("list", "audit", "verify", "discover"):
+            refused(f"{place} holds no archive, one is needed", command, "--archive", place)
+
+
+def test_a_name_that_no_run_has_is_answered_with_few_names(tmp_path: Path) -> None:
+    store = Archive(tmp_path / "archive")
+    for n in range(60):
+        store.open_run("lot", {"lot": {"units": []}}, n)
+    refused("no run is called 'lates'; did you mean latest?", "show", "lates", "--archive", store.root)
+    for name in ("zzzz", "lot"):
+        _, _, message = given("show", name, "--archive", store.root)
+        assert message.count("lot-") == 5, message
+        assert "and 55 more" in message

@@ -33,6 +33,7 @@ SLIPS: list[tuple[tuple[str, ...], str]] = [  # words of a command, and what is 
     (("diagnos", "x"), "tumbleline: no command is called 'diagnos'; did you mean diagnose?\n"),
     (("run", "nosuch"), "no recipe is called 'nosuch'"),
     (("run", "production", "--units", "A,A"), "serial A is there twice"),
+    (("run", "production", "--units", "SN1,sn1"), "serials SN1 and sn1 differ in capitals alone"),
     (("run", "production", "--units", ","), "serial '' is"),
     (("run", "--units", "{}/lot.csv"), "give the path of a slot map file in CSV or TOML"),
     (("run", "production", "--station", "none.toml"), "none.toml cannot be read"),

@@ -23,6 +23,7 @@ from pipelines.archive import Archive, Run
 from pipelines.archive.signatures import VARIABLE
 from pipelines.certificates import Ledger
 from pipelines.certificates.days import today
+from pipelines.certificates.entries import WRITING
 from pipelines.certificates.programmed import programming, unproved
 from pipelines.chain.certify import certify
 from pipelines.cli import app
@@ -31,7 +32,7 @@ from pipelines.export.device_block import HEAD, LENGTH, Form, block_of, pack, un
 from pipelines.integrity import verify
 from pipelines.jobs.job import Job
 from pipelines.programming import job, process
-from pipelines.programming.job import REASON, _held, chosen_units
+from pipelines.programming.job import _held, chosen_units
 from schemas.errors import ArchiveUnusable, OperatorNeeded, StationRefused, StationTimeout, WrongUse
 from schemas.fault import FaultOrder
 from stations.codec import Value
@@ -348,11 +349,11 @@ def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> Non
             span = {"run": "r", "start": "2026-01-01", "stated_until": "2027-01-01", "holds": lambda _day: False}
             return [
                 SimpleNamespace(number=n, ended_by=SimpleNamespace(reason=reason), **span)
-                for n, reason in enumerate([REASON, self.reason], 1)
+                for n, reason in enumerate([WRITING, self.reason], 1)
             ]
 
     assert _held(Held("superseded"), "A1", "r", "2026-06-01") is None
-    interrupted = _held(Held(REASON), "A1", "r", "2026-06-01")
+    interrupted = _held(Held(WRITING), "A1", "r", "2026-06-01")
     assert interrupted.number == 2
 
 
@@ -367,7 +368,7 @@ def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> Non
 def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change: tuple[str, str]) -> None:
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
-    ledger.revoke("A1", REASON, day=today())  # a writing of this run began once and was not completed
+    ledger.revoke("A1", WRITING, day=today())  # a writing of this run began once and was not completed
     other = small_run(Path(str(run.archive.root)).parent, None, change)
     certify(ledger, other, ["A1"])
     words = rf"certificate A1/3 is of run {re.escape(other.id)}.*not after it; write that run"
@@ -389,7 +390,7 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
 
     def meanwhile(*words: object) -> object:
         ledger.revoke("A1", "by another process", day=today())
-        certify(ledger, run, ["A1"], months=3)
+        certify(ledger, run, ["A1"], months=3, reason="another process")
         return real(*words)
 
     with monkeypatch.context() as patch:

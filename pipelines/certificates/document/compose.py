@@ -145,7 +145,7 @@ def _refuse(run: Run, calibration: Calibration) -> None:
     if calibration.state == "revoked" and calibration.ended_by is not None:
         raise WrongUse(
             f"certificate {calibration.certificate} of run {run.id} was revoked ({calibration.ended_by.reason}); no document "
-            "is made of it, certify the unit again"
+            "is made of it; measure the unit again"
         )
     if run.manifest("coefficients")["sha256"] != calibration.event.coefficients:
         stated(run, [calibration.serial])  # says which hash is which
@@ -239,7 +239,10 @@ def _grade_statement(budget: StatedBudget, grade: str) -> str:
 
 
 def _amendment(one: Calibration, known: list[Calibration]) -> content.Amendment:
-    """A certificate of the same run that this one ended: its amendment; one that ended this one: where to look now."""
-    ended = [old.certificate for old in known if old.event.sequence in one.event.ends and old.run == one.run]
+    """A certificate of the same run that this one ended, or that was revoked before: its amendment; one that ended this one."""
+    earlier = [old for old in known if old.run == one.run and old.event.sequence < one.event.sequence]
+    ended = [old.certificate for old in earlier if old.event.sequence in one.event.ends]
+    alike = [old for old in earlier if one.event.ends_others_of(old.event)][-1:]
+    ended = ended or [old.certificate for old in alike if old.withdrawn and one.event.reason]
     after = one.ended_by.certificate if one.ended_by is not None and one.ended_by.action != "revoke" else ""
     return content.Amendment(replaces=tuple(ended), reason=one.event.reason if ended else "", replaced_by=after)

@@ -76,7 +76,7 @@ def print_discovery_demo(document: DiscoveryDemo) -> None:
             f"e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}; {later}"
         )
     hidden = document["hidden"]
-    say("\n3. What was hidden?", style="bold cyan")
+    say(f"\n{3 if document['compared'] else 2}. What was hidden?", style="bold cyan")
     right = document["found"] and document["wafer_named"]
     say(
         f"{hidden['physics']} in wafer {hidden['wafer']} ({hidden['effect']}). {'Found.' if right else 'Not found.'}",

@@ -9,7 +9,7 @@ from inertial.counts import number_of
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, remark, say, short
 from pipelines.planning.documents import worst_axes
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 from schemas.decisions import LARGEST_ERROR
 
 RAISED = 3.0  # factor by which 1/f and random walk must raise a floor to be listed

@@ -21,7 +21,7 @@ FIGURES = (
 TEMPLATE = """\
 <table>
 <tr><th class="n">slot</th><th>unit</th><th>result</th><th>grade</th>
-<th class="n">fit<br><small>rms, µg</small></th><th class="n">verification<br><small>largest, µg</small></th><th class="n">error<br><small>worst axis, µg</small></th>
+<th class="n">fit<br><small>rms, µg</small></th><th class="n">verification<br><small>largest, of |a|, µg</small></th><th class="n">error<br><small>worst axis, µg</small></th>
 <th class="n">zero-g offset<br><small>mg</small></th><th class="n">N<br><small>µg/√Hz</small></th><th class="n">B<br><small>µg</small></th></tr>
 {% for unit in units %}
 <tr><td class="n">{{ unit.slot }}</td><td><a href="#{{ unit.unit }}">{{ unit.unit }}</a></td>

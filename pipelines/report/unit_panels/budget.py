@@ -24,7 +24,7 @@ NAMES = {
     "orthogonality": "angle between axes, from 90°",
     "output": "corrected output, worst of the certified range",
     "bias_error": "error on poses not used, for the user",
-    "verification_norm": "error on poses not used, worst pose",
+    "verification_norm": "error of |a| on poses not used, worst pose",
     "bias_error_period": "error expected over the period of validity",
     LARGEST_ERROR: "largest error of the axes over the period of validity",
 }

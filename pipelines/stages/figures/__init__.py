@@ -3,6 +3,7 @@
 Nothing else names a figure: limits files, tables, the report and the reference read :data:`FIGURES`.
 """
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
@@ -71,6 +72,19 @@ def figure_label(name: str) -> str:
     unit = UNITS.get(name, "").replace("%", "percent").translate(SPELT)
     kept = name[: -len(unit) - 1] if name.lower().endswith(f"_{unit}".lower()) else name
     return kept.replace("_", " ")
+
+
+def plain_reason(text: str) -> str:
+    """One reason, or several divided by ``; ``, in which a figure has its label instead of its id."""
+    return "; ".join(_plain(part) for part in text.split("; "))
+
+
+def _plain(part: str) -> str:
+    begin = re.match(r"\w+", part)
+    if begin is None or begin.group() not in UNITS:
+        return part
+    label, rest = figure_label(begin.group()), part[begin.end() :]
+    return f"{label[:1].upper()}{label[1:]}{'' if rest.startswith(':') else ':'}{rest}"
 
 
 def figures_of(tables: UnitTables) -> Iterator[Figure]:

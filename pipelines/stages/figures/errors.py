@@ -98,9 +98,9 @@ FIGURES = (
     FigureKind(
         name="verification_norm_ug",
         unit="µg",
-        meaning="Largest error of the norm, of a device with fewer axes along them, in a pose not used by the fit, mean over the "
-        "dwells of the pose.",
-        label="largest error in a pose not used, mean of its dwells",
+        meaning="Largest error of |a|, the magnitude of gravity (of a device with fewer axes, along them), in a pose not used by "
+        "the fit, mean over the dwells of the pose.",
+        label="largest error of |a| in a pose not used, mean of its dwells",
         order=20,
         value=_norm,
         missing=_verification_poses,
@@ -108,8 +108,8 @@ FIGURES = (
     FigureKind(
         name="verification_dwell_ug",
         unit="µg",
-        meaning="Largest error of the norm, of a device with fewer axes along them, in a single dwell of verification.",
-        label="largest error in a single dwell there",
+        meaning="Largest error of |a| (of a device with fewer axes, along them) in a single dwell of verification.",
+        label="largest error of |a| in a single dwell there",
         order=30,
         value=_dwell,
         missing=_verification_poses,

@@ -30,7 +30,7 @@ SHOWN = (
     "velocity_random_walk_ug_rtHz",
     "bias_instability_ug",
 )
-HEADS = ("fit residual, rms, µg", "verification error, µg", "error, rms, µg", "N, µg/√Hz", "B, µg")
+HEADS = ("fit residual, rms, µg", "verification error of |a|, µg", "error, rms, µg", "N, µg/√Hz", "B, µg")
 """Heads of the columns of these figures."""
 MOST_OTHERS = 50
 

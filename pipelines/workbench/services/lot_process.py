@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 from pipelines.archive import Archive, files
 from pipelines.chain.attendance import JUDGED, Answer, Attendance, Prompt
 from pipelines.chain.runner import Runner
-from pipelines.report.templates import plain_reason
+from pipelines.stages.figures import plain_reason
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.services.lots import request_of, write_state
 from schemas.errors import OperatorNeeded, TumblelineError

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shutil
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from ledger_events import day, event
 from typer.testing import CliRunner
 
-from pipelines.archive import Run
+from pipelines.archive import Archive, Run
 from pipelines.certificates import Ledger, LedgerEntry
 from pipelines.certificates.days import day_of, months_after
 from pipelines.certificates.validity import calibrations_of, overlapped
@@ -23,8 +24,14 @@ from schemas.errors import ArchiveUnusable, WrongUse
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return small_run(tmp_path_factory.mktemp("ledger"), {"A3": "silent"})
+
+
+@pytest.fixture
+def run(made: Run, tmp_path: Path) -> Run:
+    shutil.copytree(made.archive.root, tmp_path / "archive")
+    return Archive(tmp_path / "archive").run(made.id)
 
 
 @pytest.fixture
@@ -196,6 +203,12 @@ def test_show_tells_the_calibration_of_a_date_with_its_coefficients_origin_and_e
     assert calibration["made"]["capture"] == run.about["capture"]
     status, shown = ask(run, "show", "A1", "--at", day(-1))
     assert (status, shown["valid"], shown["calibration"]) == (1, False, None)
+    shown = CliRunner().invoke(app, ["show", "A1", "--at", "2060-01-01", "--archive", str(run.archive.root)])
+    assert (shown.exit_code, "expired" in shown.stdout, " valid " in shown.stdout.partition("\n")[2]) == (
+        1,
+        True,
+        False,
+    )
     ask(run, "revoke", "A2", "--reason", "returned damaged")
     status, shown = ask(run, "show", "A2", "--at", day(100))
     last = shown["history"][-1]

@@ -14,7 +14,9 @@ from typer.testing import Result
 from pipelines.archive import Archive, Run
 from pipelines.certificates.days import months_after
 from pipelines.integrity import verify
+from pipelines.jobs.model_change import change_from_options
 from pipelines.report import make_report
+from pipelines.rerun.rerun import again
 
 Typed = Callable[..., Result]
 
@@ -75,7 +77,7 @@ def test_revoked_coefficients_leave_the_house_only_when_they_are_asked_for(run: 
     assert "REVOKED (dropped * / on the floor) */" in header
     typed("certificate", "revoke", "A2", "--reason", "wrong reference")
     assert "was revoked (" in str(typed("export", run.id).exception)  # no unit is left
-    typed("certificate", "issue", run.id, "--units", "A1")
+    typed("certificate", "issue", run.id, "--units", "A1", "--reason", "dropped on foam")
     assert units(typed, run)["A1"]["certificate"]["certificate"] == "A1/3"
 
 
@@ -91,3 +93,23 @@ def test_the_report_names_the_certificates_and_follows_the_ledger(run: Run, type
     assert re.search(rf"A1\s+A1/1\s+{day()}\s+{day()}\s+revoked\s+dropped", page)
     assert verify(run.archive, keys={}).checked.findings == []
     assert make_report(run)
+
+
+STRICT = 'name = "strict"\n[figures]\nresidual_rms_ug = {max = 0.001, unit = "µg"}\n'
+
+
+def test_failed_units_are_marked_in_their_files_and_no_certificate_is_offered_for_them(
+    run: Run, typed: Typed, tmp_path: Path
+) -> None:
+    (tmp_path / "strict.toml").write_text(STRICT, encoding="utf-8")
+    failed = again(run.archive, run.id, change_from_options(limits=str(tmp_path / "strict.toml"))).new
+    px4 = ("--format", "px4", "--set", "nominal=256000", "--units", "A1", "--set", "device_id=1310988")
+    mark = "FAILED: grade consumer, outside its limits: Rms residual of the fit: "
+    for words in (px4, ("--format", "csv"), ("--format", "c")):
+        done = typed("export", failed, "--include", "failed", *words)
+        assert mark in done.stdout, (words, done.stderr)
+        assert f"export: A1 {mark}" in done.stderr
+        assert "certificate issue" not in done.stderr
+    passed = typed("export", run.id, "--format", "csv")
+    assert "FAILED" not in passed.stdout
+    assert f"'tumbleline certificate issue {run.id} --archive " in passed.stderr

@@ -17,6 +17,8 @@ from pipelines.archive.signatures import VARIABLE, make_key
 from pipelines.certificates import Ledger
 from pipelines.certificates.coefficient_remarks import library_remarks
 from pipelines.certificates.days import months_after
+from pipelines.certificates.document.archive_comparison import NOBODY
+from pipelines.certificates.document.compose import compose
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.refusals import allowed_months
 from pipelines.chain import certifiable
@@ -92,6 +94,33 @@ def test_a_certificate_begins_at_the_measurement_or_later_and_lasts_no_longer_th
     assert typed("certificate", "issue", run.id).exit_code == 0
     assert ledger.events("A1")[0].until == months_after(end_of(run), VALIDITY_MONTHS)
     assert typed("certificate", "issue", run.id, "--since", day(1)).exit_code == 0
+
+
+def test_what_was_revoked_is_certified_again_from_the_same_run_only_by_name_and_with_a_reason(
+    run: Run, typed: Typed
+) -> None:
+    typed("certificate", "issue", "latest")
+    typed("certificate", "revoke", "A2", "--reason", "cracked glass")
+    done = typed("certificate", "issue", "latest", "--json")
+    document = json.loads(done.stdout)
+    assert (done.exit_code, [one["serial"] for one in document["certified"]]) == (1, ["A1", "A3"])
+    assert document["left_out"]["A2"].startswith(
+        "certificate A2/1 of this run was revoked (cracked glass); measure the unit"
+    )
+    told = r"unit A2 of run .*: certificate A2/1 of this run was revoked \(cracked glass\).*--units A2 --reason TEXT"
+    for words in (("--units", "A2"), ("--units", "A2", "--reason", " ")):
+        refused = typed("certificate", "issue", run.id, *words).exception
+        assert isinstance(refused, WrongUse)
+        assert re.search(told, str(refused))
+    assert "A2" in json.loads(typed("certificate", "issue", run.id, "--reason", "all", "--json").stdout)["left_out"]
+    assert Ledger(run.archive).valid_at("A2", day()) is None
+    named = typed("certificate", "issue", run.id, "--units", "A2", "--reason", "another unit was meant", "--json")
+    (again,) = json.loads(named.stdout)["certified"]
+    assert (named.exit_code, again["certificate"], again["reason"]) == (0, "A2/3", "another unit was meant")
+    known = Ledger(run.archive).calibrations("A2")
+    amendment = compose(run, known[-1], known, NOBODY).amendment
+    assert (amendment.replaces, amendment.reason) == (("A2/1",), "another unit was meant")
+    assert typed("certificate", "issue", run.id).exit_code == 0  # it holds now like the others
 
 
 def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:

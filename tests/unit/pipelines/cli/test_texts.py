@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 from capture_double import recipe_file
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 from inertial.counts import size_text
 from inertial.planning.ranges import UnseenRange
 from pipelines.cli import app, flowing
+from pipelines.cli.text.demo_text import print_discovery_demo
 from pipelines.diagnosis.confirmation import fall_of
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
@@ -120,3 +122,10 @@ def test_inspect_sends_dwells_in_the_exchange_format_to_diagnose(tmp_path: Path)
     assert "1 unit, 2 dwells; reference: the force on each axis" in done.stdout
     assert {"reference", "covariate"} <= set(done.stdout.split())
     assert "--map" not in done.stdout
+
+
+def test_the_steps_of_a_demonstration_are_numbered_as_they_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    hidden = {"physics": "a spring that hardens", "wafer": "W05", "effect": "third_order"}
+    nothing = {"folder": "line", "lots": 60, "discoveries": [], "compared": [], "hidden": hidden, "found": False}
+    print_discovery_demo(cast("Any", {**nothing, "wafer_named": False}))
+    assert re.findall(r"^(\d)\. ", capsys.readouterr().out, re.MULTILINE) == ["1", "2"]

@@ -12,8 +12,7 @@ from pipelines.report.context import UnitContext
 from pipelines.report.numbers import with_uncertainty as in_tables
 from pipelines.report.residual_table import residual_table
 from pipelines.report.residuals import drivers_shown
-from pipelines.report.templates import plain_reason
-from pipelines.stages.figures import FIGURES
+from pipelines.stages.figures import FIGURES, plain_reason
 
 
 def test_a_figure_has_its_label_and_other_reasons_stay() -> None:
