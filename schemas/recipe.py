@@ -27,6 +27,7 @@ from schemas.bounds import (
     Wait,
 )
 from schemas.fault import FaultOrder
+from schemas.foreign import shown
 from schemas.poses import Pose, SoakPart
 from schemas.prior import PriorTerms
 from schemas.stopping import StopTerms
@@ -149,6 +150,16 @@ class _Measurement(Grown):
         if again:
             raise ValueError(
                 f"{', '.join(again)} °C is there twice in a row, a soak goes to another temperature; remove the second"
+            )
+        return values
+
+    @field_validator("procedures", mode="before")
+    @classmethod
+    def _each_in_a_table(cls, values: Any) -> Any:
+        if isinstance(values, list) and (names := [one for one in values if isinstance(one, str)]):
+            raise ValueError(
+                f"'{shown(names[0])}' is a name, a table for each procedure is needed; write [[procedures]], and below it "
+                f'kind = "{shown(names[0])}"'
             )
         return values
 

@@ -74,8 +74,8 @@ def command(
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 
     The bias is tracked where the specific force is known (--track X,Y,Z, or columns force_x, force_y, force_z of the file, unless
-    --track none) or the unit is at rest (--track at-rest); between updates its standard deviation grows according to the unit's noise. --filter smooths the
-    corrected force and delays it, as stated. Exit status 1: the updates contradict the stated noise.
+    --track none) or the unit is at rest (--track at-rest); between updates its standard deviation grows according to the unit's
+    noise. --filter smooths the corrected force and delays it, as stated. Exit status 1: the updates contradict the stated noise.
     """
     from pipelines.export import filtering
     from pipelines.export.corrected import corrected, fit_of_unit
@@ -89,7 +89,7 @@ def command(
     time, named = options.mapped_outputs(columns)
     given = options.settings(setting, SETTINGS, "correct")
     forces = [one for one in track or () if one != AT_REST]
-    if len(forces) > 1 or NOT in forces and len(track or ()) > 1:
+    if len(forces) > 1 or (NOT in forces and len(track or ()) > 1):
         raise WrongUse(f"correct: --track {' and '.join(track or ())}, one of them is needed; leave the others out")
     store = Archive(archive)
     run = store.run(name)

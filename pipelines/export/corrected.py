@@ -242,15 +242,21 @@ def steps_flicker(step_s: float, lasting_s: float) -> FlickerTerms:
     return flicker_of_steps(step_s, max(1000.0 * step_s, lasting_s))
 
 
-def terms_of_unit(fit: FitOfUnit) -> tuple[LikelyTerms, LikelyTerms]:
+def terms_of_unit(
+    fit: FitOfUnit, what: str = "tracking the bias", without: str = ""
+) -> tuple[LikelyTerms, LikelyTerms]:
     """The likeliest terms of a unit's noise in g, and their upper limits where its static record does not identify them.
+
+    Parameters
+    ----------
+    what : needs them, for messages; without : what does without them
 
     Raises
     ------
     WrongUse, DataRejected
         The run has no static record, or B of the unit is not known.
     """
-    noise = required_noise(fit.exported.noise, fit.exported.unit, fit.run, "of the bias")
+    noise = required_noise(fit.exported.noise, fit.exported.unit, fit.run, what, without)
     if not np.all(np.isfinite(noise.value["B"])):
         raise DataRejected(
             f"run {fit.run}: B of unit {fit.exported.unit} is not known; record the unit at rest for longer"

@@ -297,7 +297,8 @@ def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path,
     assert np.std(slow["x"][:, 0] - seen["x"]) > 100.0
     flight.drop(columns="unit_C").assign(force_x=400.0).to_csv("flight.csv", index=False)
     clipped = document_of(*own, "--output", "raw.csv")
-    assert clipped["told"] == ["no unit_C: 25 °C taken"]
+    assert clipped["told"][0] == "no unit_C: 25 °C taken"
+    assert "the force was taken in g; for m/s², give --unit-of force=m/s^2" in clipped["told"][1]
     assert clipped["clipped"] == n
     assert "a name that ends in .csv" in refused(*own, "--output", "raw.xls")
     assert "one of g, m/s^2" in refused(*own, "--unit-of", "force=mg", "--output", "raw.csv")

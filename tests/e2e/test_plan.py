@@ -113,6 +113,24 @@ def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces: Path) -
     assert rows["scale", "z"]["unit"] == "µg/g"
 
 
+def test_the_error_of_a_verification_pose_is_planned_with_its_noise_and_limits_at_risk_are_told(faces: Path) -> None:
+    text = f"verification = [[35.0, 55.0]]\n{RECIPE}"
+    faces.write_text(text, encoding="utf-8")
+    for density, status, key in ((1500, 0, "at_risk"), (2500, 1, "unreachable")):
+        document = document_of("plan", faces, "--noise", f"{density},0", status=status)
+        row = next(one for one in document["uncertainty"]["quantities"] if one["quantity"] == "verification_norm")
+        # six faces: its own dwell, a sixth of the bias, a half of the response
+        expected = document["dwell_error_ug"]["white"] * (1.0 + 1.0 / 6.0 + 0.5) ** 0.5
+        assert row["u"] == pytest.approx(expected, rel=1e-3)
+        assert row["shares"]["noise of the dwells"] > 0.99
+        assert "verification_norm_ug" in [one.split(":")[0] for one in document["uncertainty"][key]]
+    # U = 866 µg of 1000 µg leaves 0.31 standard deviations
+    printed = text_of("plan", faces, "--noise", "1500,0")
+    assert (
+        "mean of its dwells: limit 1000 µg, U (k = 2) 866 µg; by noise alone 76 % of good units or more fail" in printed
+    )
+
+
 def test_wander_of_the_device_counts_beside_its_white_noise(faces: Path) -> None:
     quiet, restless = (planned(faces, "--device", name) for name in ("qa700", "adxl355"))
     assert restless["dwell_error_ug"]["wander"] == pytest.approx(0.664 * 300.0, rel=0.01)
