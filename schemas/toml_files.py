@@ -16,7 +16,6 @@ AnyModel = TypeVar("AnyModel", bound=BaseModel)
 
 LONGEST_FILE = 4 * 2**20  # bytes of a file that is written by hand
 LONGEST_REASON = 400  # characters of the reason that a check gives
-LONGEST_LIST = 6  # entries of a list that a message quotes
 DEEPEST = 16  # levels of nested tables and lists; the deepest of our files has five
 
 
@@ -89,7 +88,7 @@ def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> Re
         wrong = str(first["loc"][-1])
         message = f"{source}: unknown key '{key}'; {did_you_mean(wrong, known)}"
         return RecipeInvalid(message, key=key, close=close_matches(wrong, known))
-    place = "".join(f", number {part + 1}" for part in first["loc"][:2] if isinstance(part, int))
+    place = next((f", number {part + 1}" for part in first["loc"] if isinstance(part, int)), "")
     return RecipeInvalid(f"{source}: {_sentence(first, key, place)}", key=key)
 
 
@@ -105,7 +104,7 @@ def _sentence(detail: ErrorDetails, key: str, place: str) -> str:
     if not key:
         return reason
     value = detail["input"]
-    if isinstance(value, dict) or (isinstance(value, list) and len(value) > LONGEST_LIST):
+    if isinstance(value, dict) or (isinstance(value, list) and (value or detail["type"] == "value_error")):
         return f"key '{key}'{place}: {reason}"
     text = f"'{shown(value)}'" if isinstance(value, str) else shown(value)
     return f"key '{key}'{place}: found {text}: {reason[:1].lower()}{reason[1:]}"
@@ -151,4 +150,6 @@ def reason_of(detail: ErrorDetails) -> str:
     if detail["type"] in {"too_short", "string_too_short"}:
         what = "entries" if detail["type"] == "too_short" else "characters"
         needed = f"{context['min_length']} or more {what} are needed; fill it in"
+    if detail["type"] == "string_type":
+        needed = "a text in quotes is needed; correct it"
     return needed or detail["msg"].removeprefix("Value error, ")

@@ -104,7 +104,8 @@ def plan_recipe(
     """Show station time, expected errors, and for every effect its visibility, detection floor and confounded effects.
 
     For effects that are not visible: the reason, and what to add to the recipe. For test procedures: records, station time,
-    equipment, and the figures that they determine. Exit status 1: a limit is out of reach, or 'tumbleline run' refuses the recipe.
+    equipment, and the figures that they determine. Exit status 1: a limit is out of reach, or 'tumbleline run' refuses the
+    recipe.
     """
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
     from pipelines.jobs.priors import planned_precision

@@ -104,7 +104,7 @@ def simulated(
 def _with_noise(output: Array, time: Array, fit: FitOfUnit, seed: int) -> tuple[Array, dict[str, list[float]]]:
     """The output with white noise, flicker and walk of the unit's static record."""
     rate = rate_and_gaps(time)[0]
-    terms = terms_of_unit(fit, "noise", ", or give --seed none: no noise")[0]
+    terms = terms_of_unit(fit, "the noise of a simulation", ", or give --seed none: no noise")[0]
     flicker = steps_flicker(1.0 / rate, float(time[-1] - time[0]))
     model = bias_model(terms.white, terms.instability, terms.walk, 0.0, flicker)
     rng = np.random.default_rng(seed)

@@ -10,7 +10,6 @@ from pipelines.jobs.model_files import refuse_unknown_effects
 from pipelines.jobs.recipes import load_limits, lot_of, units_of
 from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import planned_dwells, planned_state
-from pipelines.stages.grade import refuse_limits_without_figures
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.stages.uncertainty.measurands import EFFECTS
@@ -75,9 +74,10 @@ def asked_of_noise(recipe: Recipe, station: StationConfig, limits: Limits) -> di
         effect: (value / limits.coverage_factor) ** 2 - references[effect] ** 2 for effect, value in asked.items()
     }
     for effect in (effect for effect, square in allowed.items() if square <= 0.0):
+        unit, least = EFFECTS[effect], limits.coverage_factor * references[effect]
         raise RecipeInvalid(
-            f"recipe {recipe.name} on station {station.name}: [stop] asks for U = {asked[effect]:g} {EFFECTS[effect]} of "
-            f"{effect}, the references alone have U = {limits.coverage_factor * references[effect]:.3g} {EFFECTS[effect]}; write a "
+            f"recipe {recipe.name} on station {station.name}: [stop] asks for U = {asked[effect]:g} {unit} of {effect}, the "
+            f"references alone have U = {least:.3g} {unit}; write a "
             "larger U in [stop], or lower the uncertainty of the references (see 'tumbleline plan')",
             key="stop",
         )
@@ -230,7 +230,7 @@ def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list
     """
     messages: list[str] = []
     for check in (
-        lambda: refuse_limits_without_figures(load_limits(recipe, folder), recipe),
+        lambda: load_limits(recipe, folder),
         # without units in the recipe they are given to the run
         lambda: lot_of(recipe, ()) if recipe.units else None,
         lambda: refuse_contradictions(recipe, station),

@@ -143,6 +143,52 @@ def test_wander_of_the_device_counts_beside_its_white_noise(faces: Path) -> None
     assert "raised by slow noise" not in text_of("plan", "--noise", "2,0")
 
 
+REFUSED_BY_RUN = {
+    'units = ["A1"]\n[stop]\nvisible = ["thermal_histeresis"]\n': "stop.visible: unknown effect 'thermal_histeresis'",
+    "[stop]\nbias_ug = 1.0\n": "[stop] asks for U = 1 µg of bias, the references alone have U = ",
+    'limits = "consumr"\n': "no file and no built-in limits are called 'consumr'",
+    "sensor_axes = 1\n": "sensor_axes: 1 of device ADXL355, its digital output sends 3",
+    "static_record_s = 60.0\nstatic_temperature_C = 300.0\n": "key 'static_temperature_C': 300 °C, the chamber",
+}
+
+
+@each(REFUSED_BY_RUN)
+def test_what_run_refuses_is_told_by_plan_with_its_exit_status(row: str, faces: Path) -> None:
+    faces.write_text(RECIPE + row, encoding="utf-8")
+    status, _, told = given("plan", faces, "--noise", "25,0")
+    told = " ".join(told.split())
+    assert status == 1
+    assert REFUSED_BY_RUN[row] in told
+    assert "'tumbleline run' refuses this recipe" in told
+
+
+PLAIN_WORDS = {
+    (
+        'poses = "six"',
+        "poses = [[0, 0], [90]]",
+    ): "key 'poses.1', number 2: found [90]: the two angles [outer, inner] of a pose",
+    ('poses = "six"', "poses = [[0, 0], [4000, 0]]"): "key 'poses.1.0', number 2: found 4000",
+    ("[25.0]", "[]"): "key 'temperatures_C': found []: 1 or more entries are needed",
+    ('"faces"', '""'): "key 'name': found '': 1 or more characters are needed",
+    ("[25.0]", '[25.0]\nprocedures = ["rotation"]'): 'write [[procedures]], and below it kind = "rotation"',
+    (
+        '"misalignment"]',
+        '"misalignment"]\n[prior]\nfull = "missing.toml"',
+    ): "key 'prior.full': recipe: no file and no recipe",
+    ('"misalignment"]', '"misalignment"]\n[prior]'): "holds no archive, one with runs is needed",
+}
+
+
+@each(PLAIN_WORDS)
+def test_a_wrong_recipe_is_told_in_plain_words(row: tuple[str, str], faces: Path, tmp_path: Path) -> None:
+    faces.write_text(RECIPE.replace(*row), encoding="utf-8")
+    assert PLAIN_WORDS[row] in refused("plan", faces, "--archive", tmp_path / "archive")
+
+
+def test_a_criterion_that_is_none_is_told_with_those_there_are(faces: Path) -> None:
+    assert "write --criterion T:a,b, or worst" in refused("plan", "optimise", faces, "--criterion", "X:foo")
+
+
 def test_a_slow_station_needs_more_minutes(faces: Path, tmp_path: Path) -> None:
     text = (ROOT / "deploy/stations/simulated.toml").read_text(encoding="utf-8")
     (tmp_path / "slow.toml").write_text(text.replace("speed_deg_s = 30.0", "speed_deg_s = 3.0"), encoding="utf-8")
@@ -313,7 +359,7 @@ REFUSED = {
     "--criterion T:third_order,odd_quadratics": "odd_quadratic",
     "--criterion T:third_order,level_error": "an effect of the station",
     "--criterion T:third_order,odd_quadratic --set factor=2": "--set factor does not go",
-    "--criterion A:third_order,odd_quadratic": "or write --criterion T",
+    "--criterion A:third_order,odd_quadratic": "write --criterion T:a,b, or worst",
 }
 
 
