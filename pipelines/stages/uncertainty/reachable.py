@@ -181,8 +181,7 @@ def _noise_of_pose(joint: Array, columns: Array, fit: FitDesign, state: State) -
     )
     expected = to_dwells @ joint @ np.swapaxes(to_dwells, -1, -2)
     along = np.einsum("ja,ajk,ka->jk", toward, expected, toward)
-    angles = np.stack([np.broadcast_to(one, len(force)) for one in (state.outer, state.inner)], axis=-1)
-    _, pose = np.unique(angles, axis=0, return_inverse=True)
+    _, pose = np.unique(force.round(9), axis=0, return_inverse=True)
     mean = (pose == np.arange(pose.max() + 1)[:, None]) / np.bincount(pose)[:, None]
     return MICRO * float(np.sqrt(np.max(np.einsum("pj,jk,pk->p", mean, along, mean))))
 
@@ -226,9 +225,10 @@ def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[s
 def at_risk(reaches: Sequence[Reach], limits: Limits) -> list[str]:
     """The limit of a pose of verification that noise alone makes good units miss, a sentence; it can be met."""
     figure, one = "verification_norm_ug", next((r for r in reaches if r.quantity == "verification_norm"), None)
-    if one is None or figure not in limits.figures or limits.figures[figure].max is None:
+    limit = limits.figures[figure].max if figure in limits.figures else None
+    if one is None or limit is None:
         return []
-    limit, expanded = limits.figures[figure].max, limits.guard_factor * one.u
+    expanded = limits.guard_factor * one.u
     noise = one.parts.get("noise", 0.0)
     if not 0.0 < limit - expanded < LEAST_MARGIN * noise:
         return []
