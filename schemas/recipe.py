@@ -7,7 +7,7 @@ same thing with every name resolved, and is what stages and stations are given.
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, FiniteFloat, field_validator, model_validator
+from pydantic import BeforeValidator, Field, FiniteFloat, field_validator, model_validator
 
 from schemas.bounds import (
     LONGEST_RUN_S,
@@ -27,6 +27,7 @@ from schemas.bounds import (
     Wait,
 )
 from schemas.fault import FaultOrder
+from schemas.foreign import shown
 from schemas.poses import Pose, SoakPart
 from schemas.prior import PriorTerms
 from schemas.stopping import StopTerms
@@ -41,7 +42,16 @@ LEAST_SPAN_G = 1.4  # of the poses on every axis; twelve edges reach 1.41, and a
 MOST_PROCEDURES = 50  # in one recipe
 MOST_SAMPLES = 10**9  # of one record, on one axis
 
-Angles = Annotated[list[Degrees], Field(min_length=2, max_length=2)]
+
+def _refuse_other_than_two(value: Any) -> Any:
+    if isinstance(value, list | tuple) and len(value) != 2:
+        raise ValueError(
+            f"found {shown(value)}: the two angles [outer, inner] of a pose, in degrees, are needed; correct them"
+        )
+    return value
+
+
+Angles = Annotated[list[Degrees], Field(min_length=2, max_length=2), BeforeValidator(_refuse_other_than_two)]
 Gravity = Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)]  # every place on earth lies between 9.76 and 9.84 m/s²
 
 
@@ -149,6 +159,16 @@ class _Measurement(Grown):
         if again:
             raise ValueError(
                 f"{', '.join(again)} °C is there twice in a row, a soak goes to another temperature; remove the second"
+            )
+        return values
+
+    @field_validator("procedures", mode="before")
+    @classmethod
+    def _each_in_a_table(cls, values: Any) -> Any:
+        if isinstance(values, list) and (names := [one for one in values if isinstance(one, str)]):
+            raise ValueError(
+                f"'{shown(names[0])}' is a name, a table for each procedure is needed; write [[procedures]], and below it "
+                f'kind = "{shown(names[0])}"'
             )
         return values
 

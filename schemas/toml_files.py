@@ -76,7 +76,11 @@ def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> Re
 
     An unknown key is reported first: it is mostly the cause of the missing one.
     """
-    details = sorted(problem.errors(include_url=False), key=lambda d: d["type"] != "extra_forbidden")
+    # of a key that may be a text or a list, that a list is no text says nothing of what is wrong in it
+    details = sorted(
+        problem.errors(include_url=False),
+        key=lambda d: (d["type"] != "extra_forbidden", d["type"] == "string_type" and isinstance(d["input"], list)),
+    )
     first = details[0]
     key = shown(".".join(str(part) for part in first["loc"] if not _is_branch(part)))
     if first["type"] == "extra_forbidden":
@@ -84,7 +88,8 @@ def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> Re
         wrong = str(first["loc"][-1])
         message = f"{source}: unknown key '{key}'; {did_you_mean(wrong, known)}"
         return RecipeInvalid(message, key=key, close=close_matches(wrong, known))
-    return RecipeInvalid(f"{source}: {_sentence(first, key)}", key=key)
+    place = next((f", number {part + 1}" for part in first["loc"] if isinstance(part, int)), "")
+    return RecipeInvalid(f"{source}: {_sentence(first, key, place)}", key=key)
 
 
 def _is_branch(part: object) -> bool:
@@ -92,17 +97,17 @@ def _is_branch(part: object) -> bool:
     return isinstance(part, str) and (part == "str" or "[" in part)
 
 
-def _sentence(detail: ErrorDetails, key: str) -> str:
+def _sentence(detail: ErrorDetails, key: str, place: str) -> str:
     if detail["type"] == "missing":
         return f"key '{key}' is missing; add it"
     reason = shown(reason_of(detail), LONGEST_REASON)
     if not key:
         return reason
-    if isinstance(detail["input"], dict | list):
-        return f"key '{key}': {reason}"
     value = detail["input"]
+    if isinstance(value, dict) or (isinstance(value, list) and (value or detail["type"] == "value_error")):
+        return f"key '{key}'{place}: {reason}"
     text = f"'{shown(value)}'" if isinstance(value, str) else shown(value)
-    return f"key '{key}': found {text}: {reason[:1].lower()}{reason[1:]}"
+    return f"key '{key}'{place}: found {text}: {reason[:1].lower()}{reason[1:]}"
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
@@ -140,5 +145,11 @@ PATTERNS = {
 
 def reason_of(detail: ErrorDetails) -> str:
     """The reason of one problem that a model found."""
-    needed = PATTERNS.get(detail.get("ctx", {}).get("pattern", ""), "")
+    context = detail.get("ctx", {})
+    needed = PATTERNS.get(context.get("pattern", ""), "")
+    if detail["type"] in {"too_short", "string_too_short"}:
+        what = "entries" if detail["type"] == "too_short" else "characters"
+        needed = f"{context['min_length']} or more {what} are needed; fill it in"
+    if detail["type"] == "string_type":
+        needed = "a text in quotes is needed; correct it"
     return needed or detail["msg"].removeprefix("Value error, ")

@@ -80,7 +80,8 @@ class Archive:
         """Refuse a place that holds no archive, or one of another format."""
         if not (self.root / "archive.json").is_file():
             raise ArchiveUnusable(
-                f"archive: {self.root} holds no archive, one is needed; name it with --archive or TUMBLELINE_ARCHIVE"
+                f"archive: folder '{self.root}' holds no archive, one with runs is needed; name it with --archive or "
+                "TUMBLELINE_ARCHIVE"
             )
         self._refuse_other_format()
 

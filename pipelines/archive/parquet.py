@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 TABLE_MARK = b"tumbleline.table"
 SCHEMA_MARK = b"tumbleline.schema"
+_FOLDER = re.compile(r".*/(runs|captures)/[^/]+(?=/)")
 
 
 def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
@@ -52,6 +54,16 @@ def decoded(data: bytes, columns: Sequence[str] = ()) -> pa.Table:
     return file.read(columns=list(columns) if some else None, use_threads=False)
 
 
+def _remedy(path: Place) -> str:
+    """What to do about a damaged table: what a run computed can be made again, what a capture holds only be measured again."""
+    restore = "restore it from a copy that 'tumbleline archive backup' made"
+    found = _FOLDER.match(str(path))
+    if found is None:
+        return restore
+    again = {"runs": "make the run again: its capture is kept", "captures": "measure again with 'tumbleline run'"}
+    return f"{restore}, or remove {found[0]} and {again[found[1]]}"
+
+
 def read_table(path: Place, name: str, expected: str | None = None, columns: Sequence[str] = ()) -> pd.DataFrame:
     """A table of the archive, checked to be complete, written by this archive and unchanged.
 
@@ -60,7 +72,6 @@ def read_table(path: Place, name: str, expected: str | None = None, columns: Seq
     """
     import pyarrow as pa
 
-    remedy = "restore it from a copy, or remove the run's folder and run it again"
     try:
         data = path.read_bytes()
     except (FileNotFoundError, IsADirectoryError):
@@ -72,7 +83,7 @@ def read_table(path: Place, name: str, expected: str | None = None, columns: Seq
         table = decoded(data, columns)
     except (pa.ArrowInvalid, OSError) as problem:
         raise ArchiveUnusable(
-            f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {remedy}"
+            f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {_remedy(path)}"
         ) from None
     marks = table.schema.metadata or {}
     mark = marks.get(TABLE_MARK, b"").decode(errors="replace")
@@ -83,6 +94,6 @@ def read_table(path: Place, name: str, expected: str | None = None, columns: Seq
         )
     if expected is not None and hash_of(data) != expected:
         raise ArchiveUnusable(
-            f"archive: {path} has changed since it was written (its hash is not its manifest's); {remedy}"
+            f"archive: {path} has changed since it was written (its hash is not its manifest's); {_remedy(path)}"
         )
     return upgraded(name, table.to_pandas(use_threads=False), int(marks.get(SCHEMA_MARK, b"1")), str(path))

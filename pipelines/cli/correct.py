@@ -37,7 +37,7 @@ EXAMPLES = (
 )
 
 
-AT_REST = "at-rest"
+AT_REST, NOT = "at-rest", "none"
 SETTINGS = {
     "gravity": Setting("M/S2", "local gravity at rest, m/s², that of the run by default", float),
     "turn_on": Setting("UG", "change of the bias from switch-on to switch-on, µg (standard deviation)", float, 0.0),
@@ -56,9 +56,9 @@ def command(
     track: Annotated[
         list[str] | None,
         option(
-            "--track at-rest|X,Y,Z",
+            "--track at-rest|X,Y,Z|none",
             "Track the bias: where the unit is at rest, by the magnitude of gravity; or by the true specific force, g, of all "
-            "samples. May be repeated.",
+            "samples, before columns of the file; none: not at all. May be repeated.",
         ),
     ] = None,
     low_pass: options.FilterOption = "",
@@ -73,14 +73,14 @@ def command(
 ) -> None:
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 
-    The bias is tracked where the specific force is known (--track X,Y,Z, or columns force_x, force_y, force_z) or the unit is
-    at rest (--track at-rest); between updates its standard deviation grows according to the unit's noise. --filter smooths the
-    corrected force and delays it, as stated. Exit status 1: the updates contradict the stated noise.
+    The bias is tracked where the specific force is known (--track X,Y,Z, or columns force_x, force_y, force_z of the file, unless
+    --track none) or the unit is at rest (--track at-rest); between updates its standard deviation grows according to the unit's
+    noise. --filter smooths the corrected force and delays it, as stated. Exit status 1: the updates contradict the stated noise.
     """
     from pipelines.export import filtering
     from pipelines.export.corrected import corrected, fit_of_unit
     from pipelines.export.correction import correction_document, tracking_of
-    from pipelines.export.recording import at_nominal_supply, read_recording
+    from pipelines.export.recording import at_nominal_supply, read_recording, without_force
     from pipelines.jobs.model_files import use_formulas_of
     from pipelines.stages.uncertainty.budget_terms import archived_terms
 
@@ -89,8 +89,8 @@ def command(
     time, named = options.mapped_outputs(columns)
     given = options.settings(setting, SETTINGS, "correct")
     forces = [one for one in track or () if one != AT_REST]
-    if len(forces) > 1:
-        raise WrongUse(f"correct: --track {' and '.join(forces)}, one specific force is needed; leave one out")
+    if len(forces) > 1 or (NOT in forces and len(track or ()) > 1):
+        raise WrongUse(f"correct: --track {' and '.join(track or ())}, one of them is needed; leave the others out")
     store = Archive(archive)
     run = store.run(name)
     use_formulas_of(run)
@@ -103,6 +103,8 @@ def command(
     turn_on = given.get("turn_on")
     if turn_on is None and terms is not None and terms.stability is not None:
         turn_on = terms.stability.switch_on_ug
+    if NOT in forces:
+        recording, forces = without_force(recording), []
     tracking = tracking_of(
         run, recording, "".join(forces), given.get("gravity"), turn_on, given.get("step", 1.0),
         at_rest=AT_REST in (track or ()),
@@ -120,7 +122,7 @@ def command(
         done, end = filtering.filtered(recording, done, chosen, begin)
     if output is not None:
         _write(recording, done, output)
-    document = correction_document(recording, fit, done, None if printed else output)
+    document = correction_document(recording, fit, done, tracking, None if printed else output)
     document["filter"] = None if chosen is None else filtering.filter_document(chosen, source)
     if state is not None:
         passed = None if chosen is None or end is None else (chosen, end)
@@ -179,6 +181,7 @@ def _print(show: Callable[..., None], document: CorrectDocument) -> None:
 
 def _print_bias(bias: TrackedBiasDocument, show: Callable[..., None]) -> None:
     """Print the tracked bias, and whether the innovations agree with the stated noise."""
+    show(f"force by which the bias is tracked: {'; '.join(bias['force_from'])}")
     show(f"bias at the end, µg: {_axes(bias['last_ug'])}; standard uncertainty: {_axes(bias['u_last_ug'])}")
     limits = bias["u_last_at_limits_ug"]
     if limits is not None and any(limits[axis] > 1.2 * bias["u_last_ug"][axis] for axis in limits):

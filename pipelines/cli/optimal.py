@@ -64,11 +64,15 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
 def _discriminates(options: OptimiseOptions) -> bool:
     """Whether the options require discrimination; options that do not go together are refused."""
     parts = options.criterion.upper() == "T"
+    if not parts and options.part:
+        raise WrongUse(
+            f"plan: --criterion {options.criterion}:{options.part}: found '{options.criterion}' before the colon, T is needed to "
+            "discriminate between effects; write --criterion T:a,b, or worst, A or D without a colon"
+        )
     other = (
         {"--wanted EFFECT=µg": options.required_errors, "--set factor": options.factor != 1.0}
         if parts
         else {
-            f":{options.part}": options.part,
             "--set size": options.size is not None,
             "--set separation": options.separation is not None,
         }

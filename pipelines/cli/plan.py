@@ -104,13 +104,14 @@ def plan_recipe(
     """Show station time, expected errors, and for every effect its visibility, detection floor and confounded effects.
 
     For effects that are not visible: the reason, and what to add to the recipe. For test procedures: records, station time,
-    equipment, and the figures that they determine.
+    equipment, and the figures that they determine. Exit status 1: a limit is out of reach, or 'tumbleline run' refuses the
+    recipe.
     """
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
     from pipelines.jobs.priors import planned_precision
     from pipelines.jobs.recipes import folder_of, load_limits
     from pipelines.jobs.releases import planned_recipe
-    from pipelines.jobs.terms import planned_terms, refused_by_run
+    from pipelines.jobs.terms import planned_terms, refuse_missing_full, refused_by_run
     from pipelines.planning.context import noise_of, plan_context, plan_of_procedures, procedure_rows
     from pipelines.planning.plan import plan
     from schemas.station import load_station
@@ -120,19 +121,21 @@ def plan_recipe(
     config = load_station(station)
     planned = planned_recipe(recipe, effects, model, archive, config.name)
     planned = with_moved_poses(planned, moves_of(pose or (), "plan"), "plan")
-    for message in refused_by_run(planned, config, folder_of(recipe)):
-        remark(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
+    refuse_missing_full(planned, folder_of(recipe))
     try:
         limits = load_limits(planned, folder_of(recipe))
     except RecipeInvalid:
         limits = None  # a plan does not need them
     if not planned.tumbles and page is None and pictures is None:
-        give(plan_of_procedures(planned, config, limits), print_procedures, as_json=as_json)
+        refused = _warned(refused_by_run(planned, config, folder_of(recipe)))
+        document = plan_of_procedures(planned, config, limits)
+        conclude(document, print_procedures, as_json=as_json, passed=not refused)
         return
     prior = planned_precision(planned, archive, config.kind)
     noise_of_device = noise_of(planned, device or planned.device, *_densities(noise))
     context = plan_context(planned, config, noise_of_device, prior=prior)
     document = plan(context, planned_terms(planned, config, limits), limits)
+    refused = _warned(refused_by_run(planned, config, folder_of(recipe)))
     if planned.procedures:
         document["procedures"] = procedure_rows(planned, config, limits)
     if page is not None:
@@ -140,7 +143,15 @@ def plan_recipe(
         document["page"] = str(page)
     if pictures is not None:
         write_pictures(pictures, document, context)
-    conclude(document, print_plan, as_json=as_json, passed=not (document.get("uncertainty") or {}).get("unreachable"))
+    passed = not refused and not (document.get("uncertainty") or {}).get("unreachable")
+    conclude(document, print_plan, as_json=as_json, passed=passed)
+
+
+def _warned(messages: list[str]) -> list[str]:
+    """What 'tumbleline run' refuses in the recipe, said."""
+    for message in messages:
+        remark(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
+    return messages
 
 
 def optimise(

@@ -43,13 +43,19 @@ class Terminal:
 def scanned(slots: int) -> Seating:
     """The seating, scanned at the terminal slot by slot."""
     remark(f"Scan the units, slot by slot (0 to {slots - 1}); Enter alone leaves a slot empty.")
-    seating = scan(slots, lambda slot: _line(f"slot {slot:>2}: "), lambda message: remark(message, style="yellow"))
+    seating = scan(
+        slots, lambda slot: _line(f"slot {slot:>2}: ", NOT_SCANNED), lambda message: remark(message, style="yellow")
+    )
     if not seating.units:
         raise WrongUse("scan: no unit was scanned, at least one is needed; give the command again")
     return seating
 
 
 MEASURES = "y or Enter measures it, n leaves it; Ctrl-C stops, and the same command continues"
+NOT_SCANNED = (
+    "scan: standard input ended before every slot was scanned, a line for each is needed, empty for an empty slot; scan at a "
+    "terminal, or name the units with --units SN,… or a slot map"
+)
 UNATTENDED = "operator: standard input ended before an answer, a line is needed; run without an operator with --yes"
 
 

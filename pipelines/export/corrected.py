@@ -67,7 +67,7 @@ class KeptTrack:
 class Tracking:
     """How the bias is tracked.
 
-    force : (3,), g, for the samples whose force the recording does not state; None: not known
+    force : (3,), g, of all samples, whatever the recording states; None: as it states
     magnitude : g, of the force on a unit at rest; None: the recording is not searched for rest
     turn_on_ug : standard deviation of the bias from one switch-on to the next
     step_s : time between updates
@@ -205,7 +205,7 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
     if not (np.all(np.isfinite(known), axis=1) | np.isfinite(magnitude)).any():
         raise DataRejected(
             f"{recording.name}: the force is known nowhere and the unit is never at rest, one of them is needed to track the "
-            "bias; give --force, columns force_x, force_y, force_z, or record the unit at rest"
+            "bias; give --track X,Y,Z, columns force_x, force_y, force_z, or record the unit at rest"
         )
     if len(time) % per:  # the samples after the last whole step are too few for an update: time passes in the filter
         middle = np.append(middle, time[-1])
@@ -242,15 +242,21 @@ def steps_flicker(step_s: float, lasting_s: float) -> FlickerTerms:
     return flicker_of_steps(step_s, max(1000.0 * step_s, lasting_s))
 
 
-def terms_of_unit(fit: FitOfUnit) -> tuple[LikelyTerms, LikelyTerms]:
+def terms_of_unit(
+    fit: FitOfUnit, what: str = "tracking the bias", without: str = ""
+) -> tuple[LikelyTerms, LikelyTerms]:
     """The likeliest terms of a unit's noise in g, and their upper limits where its static record does not identify them.
+
+    Parameters
+    ----------
+    what : needs them, for messages; without : what does without them
 
     Raises
     ------
     WrongUse, DataRejected
         The run has no static record, or B of the unit is not known.
     """
-    noise = required_noise(fit.exported.noise, fit.exported.unit, fit.run, "of the bias")
+    noise = required_noise(fit.exported.noise, fit.exported.unit, fit.run, what, without)
     if not np.all(np.isfinite(noise.value["B"])):
         raise DataRejected(
             f"run {fit.run}: B of unit {fit.exported.unit} is not known; record the unit at rest for longer"
@@ -285,9 +291,7 @@ def _references(
     recording: CorrectableRecording, tracking: Tracking, force: Array, per: int, rate: float
 ) -> tuple[Array, Array]:
     """True force (m, 3) and its magnitude (m,) at the steps, g; NaN where they are not known."""
-    known = recording.known.copy()
-    if tracking.force is not None:
-        known[~np.isfinite(known).all(axis=1)] = tracking.force
+    known = recording.known if tracking.force is None else np.broadcast_to(tracking.force, (len(force), 3))
     stated = _means(known, per)  # a step with a sample of unknown force is unknown
     magnitude = np.full(len(stated), np.nan)
     if tracking.magnitude is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from inertial.arrays import Array
+from inertial.quantities import FORCE_COLUMNS
 from pipelines.archive import Run
 from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
 from pipelines.export.documents import CorrectDocument
@@ -34,7 +35,7 @@ def tracking_of(
     gravity : m/s²; None: that of the run
     turn_on : µg, given or stated by the run; step : s
     """
-    if not (force or at_rest or bool(np.isfinite(recording.known).all(axis=1).any())):
+    if not (force or at_rest or _states_force(recording)):
         return None
     known = None
     if force:
@@ -64,7 +65,7 @@ def tracking_of(
 
 
 def correction_document(
-    recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, output: Path | None
+    recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, tracking: Tracking | None, output: Path | None
 ) -> CorrectDocument:
     """What was corrected, with which calibration, how well, and the bias where it was tracked."""
     sd = _deviation_ug(done.covariance)
@@ -87,11 +88,12 @@ def correction_document(
         "state": None,
         "bias": None,
     }
-    if done.track is None or done.kept is None:
+    if tracking is None or done.track is None or done.kept is None:
         return document
     track, check = done.track, done.track.consistency
     at_limits = None if done.at_limits is None else _by_axis(_deviation_ug(done.at_limits.covariance[-1]))
     document["bias"] = {
+        "force_from": _force_from(recording, tracking),
         "last_ug": _by_axis(MICRO * track.bias[-1]),
         "u_last_ug": _by_axis(_deviation_ug(track.covariance[-1])),
         "u_last_at_limits_ug": at_limits,
@@ -108,6 +110,24 @@ def correction_document(
         "processes_flat": done.kept.flicker.flatness,
     }
     return document
+
+
+def _states_force(recording: CorrectableRecording) -> bool:
+    return bool(np.isfinite(recording.known).all(axis=1).any())
+
+
+def _force_from(recording: CorrectableRecording, tracking: Tracking) -> list[str]:
+    """Where the force is known from, a phrase each; of columns that do not count it is said that they do not."""
+    columns = f"the file's columns {', '.join(FORCE_COLUMNS)}"
+    found = list[str]()
+    if tracking.force is not None:
+        beside = f", which counts instead of {columns}" if _states_force(recording) else ""
+        found.append(f"--track {','.join(f'{value:g}' for value in tracking.force)}{beside}")
+    elif _states_force(recording):
+        found.append(columns)
+    if tracking.magnitude is not None:
+        found.append("gravity where the unit is at rest")
+    return found
 
 
 def _deviation_ug(covariance: Array) -> Array:

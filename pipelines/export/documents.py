@@ -23,6 +23,7 @@ class FilterDocument(TypedDict):
 class TrackedBiasDocument(TypedDict):
     """The bias that was tracked along a recording."""
 
+    force_from: Annotated[list[str], "where the true force is known from"]
     last_ug: Annotated[dict[str, float], "bias at the end, by axis"]
     u_last_ug: Annotated[dict[str, float], "its standard uncertainty, by axis"]
     u_last_at_limits_ug: Annotated[

@@ -109,6 +109,11 @@ def at_nominal_supply(recording: CorrectableRecording, follows: FollowedSupply) 
     return replace(recording, output=recording.output / follows.ratio(supply)[:, None])
 
 
+def without_force(recording: CorrectableRecording) -> CorrectableRecording:
+    """The recording without what its file states of the true force."""
+    return replace(recording, known=np.full_like(recording.known, np.nan))
+
+
 def _state(table: pd.DataFrame, time: Array, used: set[str], where: str) -> State:
     """Conditions by the names of recorded quantities; any other column of numbers is a covariate."""
     known: dict[str, Any] = {}

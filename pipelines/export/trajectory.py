@@ -93,13 +93,18 @@ def simulated(
         inside = np.clip(output, zero - fit.exported.full_scale, zero + fit.exported.full_scale)
         clipped = int(np.count_nonzero(np.any(inside != output, axis=1)))
         output = np.rint(inside) if fit.exported.out_unit == "LSB" else inside
+    if clipped == len(output) and unit_of_force == "g":
+        told = (
+            *told,
+            "all samples are at the end of the range: the force was taken in g; for m/s², give --unit-of force=m/s^2",
+        )
     return SimulatedOutput(recording, output, force, added, clipped, told)
 
 
 def _with_noise(output: Array, time: Array, fit: FitOfUnit, seed: int) -> tuple[Array, dict[str, list[float]]]:
     """The output with white noise, flicker and walk of the unit's static record."""
     rate = rate_and_gaps(time)[0]
-    terms = terms_of_unit(fit)[0]
+    terms = terms_of_unit(fit, "the noise of a simulation", ", or give --seed none: no noise")[0]
     flicker = steps_flicker(1.0 / rate, float(time[-1] - time[0]))
     model = bias_model(terms.white, terms.instability, terms.walk, 0.0, flicker)
     rng = np.random.default_rng(seed)

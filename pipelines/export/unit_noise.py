@@ -82,11 +82,11 @@ def curve_of_unit(run: Run, unit: str) -> UnitCurve | None:
     return UnitCurve(deviation, np.rint(tau * rate).astype(np.int64), n, rate)
 
 
-def required_noise(noise: UnitNoise | None, unit: str, run: str, form: str) -> UnitNoise:
-    """The noise of a unit; refused where the run does not state it."""
+def required_noise(noise: UnitNoise | None, unit: str, run: str, form: str, without: str = "") -> UnitNoise:
+    """The noise of a unit; refused where the run does not state it, with ``without``: what does without it."""
     if noise is None or not all(np.all(np.isfinite(noise.value[s])) for s in ("N", "K")):
         raise WrongUse(
-            f"export: run {run} has no noise terms of unit {unit}, format {form} needs them; run a recipe with static_record_s "
-            "above 0"
+            f"run {run}: it has no noise terms of unit {unit}, {form} needs them; measure with static_record_s above 0 in the "
+            f"recipe{without}"
         )
     return noise

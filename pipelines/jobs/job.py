@@ -18,6 +18,8 @@ from pipelines.jobs.terms import (
     budget_terms,
     refuse_beyond_station,
     refuse_contradictions,
+    refuse_missing_full,
+    refuse_other_outputs,
     refuse_unreachable,
     refuse_unusable_stop,
     with_stability,
@@ -189,6 +191,7 @@ class Request:
         if self.recipe.startswith(OF_RUN):
             return self._of_run(archive)
         recipe = load_recipe(self.recipe, lambda device: self._line_model(archive, device))
+        refuse_missing_full(recipe, folder_of(self.recipe))
         limits = load_limits(recipe, folder_of(self.recipe))
         lot = lot_of(recipe, self.units, self.slots, seed=self.seed, repeat=self.repeat)
         station = with_faults(load_station(self.station), [*recipe.faults, *map(parse_fault, self.faults)])
@@ -313,11 +316,10 @@ def fillings(serials: Sequence[str], slots: int) -> list[tuple[str, ...]]:
 
 
 def _refuse_unknown_device(job: Job) -> None:
-    """Refuse devices and faults that a simulated station does not know; on hardware the slots tell what they hold."""
+    """Refuse devices and faults that a simulated station does not know."""
+    refuse_other_outputs(job.recipe, job.station)
     if job.station.simulation is not None:
-        from stations.plant.faults.catalogue import build_fault
-        from stations.plant.preset import load_preset  # a station of hardware has no plant
+        from stations.plant.faults.catalogue import build_fault  # a station of hardware has no plant
 
-        load_preset(job.lot.device, job.station.simulation.preset_overrides).with_axes(job.lot.sensor_axes)
         for fault in job.station.simulation.faults:
             build_fault(fault, [unit.serial for unit in job.lot.units])

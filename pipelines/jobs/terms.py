@@ -7,11 +7,12 @@ import numpy as np
 
 from inertial.planning.visibility import visibilities
 from pipelines.jobs.model_files import refuse_unknown_effects
-from pipelines.jobs.recipes import load_limits, lot_of
+from pipelines.jobs.recipes import load_limits, lot_of, units_of
 from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import planned_dwells, planned_state
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.uncertainty.contributions import merged
+from pipelines.stages.uncertainty.measurands import EFFECTS
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
 from schemas.errors import RecipeInvalid, TumblelineError
 from schemas.limits import VALIDITY_MONTHS, Limits
@@ -73,10 +74,11 @@ def asked_of_noise(recipe: Recipe, station: StationConfig, limits: Limits) -> di
         effect: (value / limits.coverage_factor) ** 2 - references[effect] ** 2 for effect, value in asked.items()
     }
     for effect in (effect for effect, square in allowed.items() if square <= 0.0):
+        unit, least = EFFECTS[effect], limits.coverage_factor * references[effect]
         raise RecipeInvalid(
-            f"recipe {recipe.name} on station {station.name}: [stop] asks for U = {asked[effect]:g} of {effect}, the references "
-            f"alone have U = {limits.coverage_factor * references[effect]:.3g}; ask for more, or lower their uncertainty "
-            "(see 'tumbleline plan')",
+            f"recipe {recipe.name} on station {station.name}: [stop] asks for U = {asked[effect]:g} {unit} of {effect}, the "
+            f"references alone have U = {least:.3g} {unit}; write a "
+            "larger U in [stop], or lower the uncertainty of the references (see 'tumbleline plan')",
             key="stop",
         )
     return {effect: float(np.sqrt(square)) for effect, square in allowed.items()}
@@ -180,16 +182,34 @@ def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
         )
 
 
+def refuse_other_outputs(recipe: Recipe, station: StationConfig) -> None:
+    """Refuse, on a simulated station, an unknown device, and a number of axes that it cannot have; slots tell it on hardware."""
+    if station.simulation is not None:
+        from stations.plant.preset import load_preset  # a station of hardware has no plant
+
+        load_preset(recipe.device, station.simulation.preset_overrides).with_axes(recipe.sensor_axes)
+
+
+def refuse_missing_full(recipe: Recipe, folder: Path) -> None:
+    """Refuse a full plan of ``[prior]`` that is not there; ``folder``: where it is looked for first."""
+    if recipe.prior is not None and (name := recipe.prior.full):
+        try:
+            units_of(str(folder / name) if (folder / name).is_file() else name)
+        except RecipeInvalid as problem:
+            raise RecipeInvalid(f"recipe {recipe.name}: key 'prior.full': {problem}", key="prior.full") from None
+
+
 def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:
     """Refuse temperatures, °C, angles, degrees, and rates, Hz, outside of the limits of the station.
 
     Raises RecipeInvalid: names the key, the first value outside, and the range
     """
     limits = station.limits
-    temperatures = [*recipe.temperatures_C, *([recipe.static_temperature_C] if recipe.static_record_s > 0.0 else [])]
+    static = [recipe.static_temperature_C] if recipe.static_record_s > 0.0 else []
     chosen = [*recipe.poses, *recipe.verification, recipe.static_pose]
     for key, values, (low, high), unit, owner in (
-        ("temperatures_C", temperatures, limits.temperature_C, "°C", "chamber"),
+        ("temperatures_C", recipe.temperatures_C, limits.temperature_C, "°C", "chamber"),
+        ("static_temperature_C", static, limits.temperature_C, "°C", "chamber"),
         ("poses (outer)", [p.outer_deg for p in chosen], limits.outer_deg[:2], "°", "table"),
         ("poses (inner)", [p.inner_deg for p in chosen], limits.inner_deg[:2], "°", "table"),
         ("rate_hz", [recipe.rate_hz], (0.0, limits.rate_hz), "Hz", "reader"),
@@ -204,7 +224,7 @@ def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:
 
 
 def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list[str]:
-    """What 'tumbleline run' refuses in a recipe that can be planned: limits, serial numbers, ranges of the station.
+    """What 'tumbleline run' refuses in a recipe that can be planned: limits, serials, ranges of the station, ``[stop]``.
 
     folder : where a limits file that the recipe names is looked for
     """
@@ -213,11 +233,15 @@ def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list
         lambda: load_limits(recipe, folder),
         # without units in the recipe they are given to the run
         lambda: lot_of(recipe, ()) if recipe.units else None,
+        lambda: refuse_contradictions(recipe, station),
+        lambda: refuse_other_outputs(recipe, station),
         lambda: refuse_beyond_station(recipe, station),
         lambda: refuse_unusable(recipe, station),
+        lambda: refuse_unusable_stop(recipe, station, load_limits(recipe, folder)),
     ):
         try:
             check()
         except TumblelineError as problem:
-            messages.append(str(problem))
+            if str(problem) not in messages:  # limits that are missing are missed twice
+                messages.append(str(problem))
     return messages

@@ -108,6 +108,7 @@ class ReachableUncertainty(TypedDict):
     ]
     quantities: list[ReachableQuantity]
     unreachable: Annotated[list[str], "limits that cannot be met, and why; empty: none"]
+    at_risk: Annotated[list[str], "limits that can be met, but noise alone makes good units miss; empty: none"]
     remarks: list[str]
 
 

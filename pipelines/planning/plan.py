@@ -24,7 +24,7 @@ from pipelines.planning.context import OF_VERIFICATION, PlanContext, shown_by_ve
 from pipelines.schedule.planned_state import planned_dwells
 from pipelines.schedule.timing import spent
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
-from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
+from pipelines.stages.uncertainty.reachable import PlannedDwells, at_risk, reachable, unreachable
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.calibration import unit_texts
 from schemas.limits import Limits
@@ -69,14 +69,17 @@ def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits 
     }
 
 
-def _of_record(context: PlanContext) -> Array:
+def _of_record(context: PlanContext, verification: Array | None = None) -> Array:
     """Covariance of the dwells as a fit sees it: what changes more slowly than the record is, for the record, the bias itself.
 
     The walk is counted from its mean over the record, as in a fit.
+
+    verification : (m,), s, times of dwells that follow those of the fit in the covariance
     """
-    time, length = context.state.time, context.recipe.dwell_s
+    fit, length = context.state.time, context.recipe.dwell_s
+    time = fit if verification is None else np.concatenate([fit, verification])
     since = float(time.min()) - 0.5 * length
-    along, own = walk_mean(time, since, float(time.min()), float(np.ptp(time)))
+    along, own = walk_mean(time, since, float(fit.min()), float(np.ptp(fit)))
     covariance = dwell_covariance(time, length, context.noise, since=since)
     return covariance + context.noise.walk**2 * (own - along[:, None] - along)
 
@@ -222,7 +225,8 @@ def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: L
     slowest = None if terms.stability is None else terms.stability.flicker_slowest_s
     within = noise.instability * flicker_within(Windows(span, length, 0.0), slowest)
     run = MICRO * float(np.hypot(noise.white(length), within))
-    planned = PlannedDwells(*dwells, covariance, run, MICRO * noise.instability)
+    joint = None if dwells.verification is None else _of_record(context, dwells.verification.time)
+    planned = PlannedDwells(*dwells, covariance, run, MICRO * noise.instability, joint)
     reaches = reachable(planned, terms, context.recipe.effects)
     months = terms.certificate.validity_months
     return {
@@ -243,6 +247,7 @@ def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: L
             for one in reaches
         ],
         "unreachable": [] if limits is None else unreachable(reaches, limits, months),
+        "at_risk": [] if limits is None else at_risk(reaches, limits),
         "remarks": remarks(context, terms),
     }
 

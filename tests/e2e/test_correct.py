@@ -11,7 +11,7 @@ import pytest
 from c_compiler import FIXED, REAL, compiled
 from capture_double import LSB_PER_G, CaptureDouble, small_job
 from each import each
-from in_process import document_of, given, refused
+from in_process import document_of, given, refused, text_of
 from scipy import signal
 from scipy.io import loadmat
 from test_guides import wrong
@@ -297,7 +297,8 @@ def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path,
     assert np.std(slow["x"][:, 0] - seen["x"]) > 100.0
     flight.drop(columns="unit_C").assign(force_x=400.0).to_csv("flight.csv", index=False)
     clipped = document_of(*own, "--output", "raw.csv")
-    assert clipped["told"] == ["no unit_C: 25 °C taken"]
+    assert clipped["told"][0] == "no unit_C: 25 °C taken"
+    assert "the force was taken in g; for m/s², give --unit-of force=m/s^2" in clipped["told"][1]
     assert clipped["clipped"] == n
     assert "a name that ends in .csv" in refused(*own, "--output", "raw.xls")
     assert "one of g, m/s^2" in refused(*own, "--unit-of", "force=mg", "--output", "raw.csv")
@@ -308,6 +309,28 @@ def test_a_wrong_force_is_told_by_the_innovations(run: Run, home: Path, rng: np.
     wander = np.cumsum(2e-5 * rng.normal(size=(6000, 3)), axis=0)  # far more than the unit's noise
     document, _ = corrected(run, still(run, rng, 6000, bias=wander), *UP, status=1)
     assert document["bias"]["stated_uncertainty"] == "too small"
+
+
+def test_it_is_said_where_the_force_comes_from_and_what_is_stated_counts(
+    run: Run, home: Path, rng: np.random.Generator
+) -> None:
+    bias = np.array([2e-3, 0.0, -1e-3])
+    # the force of the columns is wrong by 10 mg
+    table = still(run, rng, 6000, bias=bias).assign(force_x=0.01, force_y=0.0, force_z=1.0)
+    own = ("--set", "turn_on=3000")
+    columns = "the file's columns force_x, force_y, force_z"
+    document, _ = corrected(run, table, *own)
+    assert (document["bias"]["force_from"], document["bias"]["updates"]) == ([columns], 60)
+    assert document["bias"]["last_ug"]["x"] == pytest.approx(1e6 * bias[0] - 10_000.0, abs=200.0)
+    document, _ = corrected(run, table, *own, "--track", "0,0,1")
+    assert document["bias"]["force_from"] == [f"--track 0,0,1, which counts instead of {columns}"]
+    assert document["bias"]["last_ug"]["x"] == pytest.approx(1e6 * bias[0], abs=200.0)
+    document, done = corrected(run, table, "--track", "none")
+    assert (document["bias"], "bias_x_ug" in done) == (None, False)
+    command = ("correct", "a.csv", "latest:A1", "--archive", run.archive.root, *own)
+    assert f"force by which the bias is tracked: {columns} bias" in text_of(*command)
+    both = ("--track", "none", "--track", "at-rest")
+    assert "--track none and at-rest, one of them is needed" in refused(*command, *both)
 
 
 def test_a_gap_in_the_recording_changes_neither_steps_nor_uncertainty(

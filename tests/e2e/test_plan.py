@@ -113,6 +113,24 @@ def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces: Path) -
     assert rows["scale", "z"]["unit"] == "µg/g"
 
 
+def test_the_error_of_a_verification_pose_is_planned_with_its_noise_and_limits_at_risk_are_told(faces: Path) -> None:
+    text = f"verification = [[35.0, 55.0]]\n{RECIPE}"
+    faces.write_text(text, encoding="utf-8")
+    for density, status, key in ((1500, 0, "at_risk"), (2500, 1, "unreachable")):
+        document = document_of("plan", faces, "--noise", f"{density},0", status=status)
+        row = next(one for one in document["uncertainty"]["quantities"] if one["quantity"] == "verification_norm")
+        # six faces: its own dwell, a sixth of the bias, a half of the response
+        expected = document["dwell_error_ug"]["white"] * (1.0 + 1.0 / 6.0 + 0.5) ** 0.5
+        assert row["u"] == pytest.approx(expected, rel=1e-3)
+        assert row["shares"]["noise of the dwells"] > 0.99
+        assert "verification_norm_ug" in [one.split(":")[0] for one in document["uncertainty"][key]]
+    # U = 866 µg of 1000 µg leaves 0.31 standard deviations
+    printed = text_of("plan", faces, "--noise", "1500,0")
+    assert (
+        "mean of its dwells: limit 1000 µg, U (k = 2) 866 µg; by noise alone 76 % of good units or more fail" in printed
+    )
+
+
 def test_wander_of_the_device_counts_beside_its_white_noise(faces: Path) -> None:
     quiet, restless = (planned(faces, "--device", name) for name in ("qa700", "adxl355"))
     assert restless["dwell_error_ug"]["wander"] == pytest.approx(0.664 * 300.0, rel=0.01)
@@ -123,6 +141,52 @@ def test_wander_of_the_device_counts_beside_its_white_noise(faces: Path) -> None
     listed = told.partition("raised by slow noise")[2].partition("effect visible in part")[0]
     assert re.search(r"step_change|warm_up|bias_temperature_quadratic|creep_after_move", listed)
     assert "raised by slow noise" not in text_of("plan", "--noise", "2,0")
+
+
+REFUSED_BY_RUN = {
+    'units = ["A1"]\n[stop]\nvisible = ["thermal_histeresis"]\n': "stop.visible: unknown effect 'thermal_histeresis'",
+    "[stop]\nbias_ug = 1.0\n": "[stop] asks for U = 1 µg of bias, the references alone have U = ",
+    'limits = "consumr"\n': "no file and no built-in limits are called 'consumr'",
+    "sensor_axes = 1\n": "sensor_axes: 1 of device ADXL355, its digital output sends 3",
+    "static_record_s = 60.0\nstatic_temperature_C = 300.0\n": "key 'static_temperature_C': 300 °C, the chamber",
+}
+
+
+@each(REFUSED_BY_RUN)
+def test_what_run_refuses_is_told_by_plan_with_its_exit_status(row: str, faces: Path) -> None:
+    faces.write_text(RECIPE + row, encoding="utf-8")
+    status, _, told = given("plan", faces, "--noise", "25,0")
+    told = " ".join(told.split())
+    assert status == 1
+    assert REFUSED_BY_RUN[row] in told
+    assert "'tumbleline run' refuses this recipe" in told
+
+
+PLAIN_WORDS = {
+    (
+        'poses = "six"',
+        "poses = [[0, 0], [90]]",
+    ): "key 'poses.1', number 2: found [90]: the two angles [outer, inner] of a pose",
+    ('poses = "six"', "poses = [[0, 0], [4000, 0]]"): "key 'poses.1.0', number 2: found 4000",
+    ("[25.0]", "[]"): "key 'temperatures_C': found []: 1 or more entries are needed",
+    ('"faces"', '""'): "key 'name': found '': 1 or more characters are needed",
+    ("[25.0]", '[25.0]\nprocedures = ["rotation"]'): 'write [[procedures]], and below it kind = "rotation"',
+    (
+        '"misalignment"]',
+        '"misalignment"]\n[prior]\nfull = "missing.toml"',
+    ): "key 'prior.full': recipe: no file and no recipe",
+    ('"misalignment"]', '"misalignment"]\n[prior]'): "holds no archive, one with runs is needed",
+}
+
+
+@each(PLAIN_WORDS)
+def test_a_wrong_recipe_is_told_in_plain_words(row: tuple[str, str], faces: Path, tmp_path: Path) -> None:
+    faces.write_text(RECIPE.replace(*row), encoding="utf-8")
+    assert PLAIN_WORDS[row] in refused("plan", faces, "--archive", tmp_path / "archive")
+
+
+def test_a_criterion_that_is_none_is_told_with_those_there_are(faces: Path) -> None:
+    assert "write --criterion T:a,b, or worst" in refused("plan", "optimise", faces, "--criterion", "X:foo")
 
 
 def test_a_slow_station_needs_more_minutes(faces: Path, tmp_path: Path) -> None:
@@ -295,7 +359,7 @@ REFUSED = {
     "--criterion T:third_order,odd_quadratics": "odd_quadratic",
     "--criterion T:third_order,level_error": "an effect of the station",
     "--criterion T:third_order,odd_quadratic --set factor=2": "--set factor does not go",
-    "--criterion A:third_order,odd_quadratic": "or write --criterion T",
+    "--criterion A:third_order,odd_quadratic": "write --criterion T:a,b, or worst",
 }
 
 

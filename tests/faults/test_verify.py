@@ -252,7 +252,7 @@ def test_the_command_leaves_with_status_1_where_something_is_wrong(copy: Path) -
     told = CliRunner().invoke(app, arguments[:-1])
     assert all(words in told.stdout for words in ("coefficients.parquet", "UNSIGNED"))
     empty = CliRunner().invoke(app, ["verify", "--archive", str(copy / "chain")])
-    assert "holds no archive, one is needed" in str(empty.exception)
+    assert "holds no archive, one with runs is needed" in str(empty.exception)
 
 
 @pytest.fixture(scope="module")

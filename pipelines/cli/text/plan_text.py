@@ -152,7 +152,7 @@ TITLES = {
     "misalignment": "misalignment",
     "bias_temperature": "bias over temperature",
     "scale_temperature": "scale over temperature",
-    "verification_norm": "error in a verification pose",
+    "verification_norm": "error in a verification pose, with noise",
     "bias_error": "error by the references alone",
     "bias_error_period": "error over the period, RMS",
     LARGEST_ERROR: "largest error of an axis over the period, 95 % bound",
@@ -189,8 +189,11 @@ def print_reach(reach: dict[str, Any] | None) -> None:
         say("references: assumed values, which allow no certificate")
     for name, rules in reach["not_stated"].items():
         say(f"not stated: {name} (dominates {rules})")
-    for line in (*reach["remarks"], *(f"limit out of reach: {plain_reason(one)}" for one in reach["unreachable"])):
+    for line in reach["remarks"]:
         say(line)
+    for name, key in (("limit out of reach", "unreachable"), ("limit at risk", "at_risk")):
+        for one in reach[key]:
+            say(f"{name}: {plain_reason(one)}")
 
 
 ERROR_HEADS = ("coefficient, unit", "error\n1σ", "required", "ratio", "given\n1σ")

@@ -33,7 +33,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
         The run has no static record.
     """
     unit = units[0]
-    noise = required_noise(unit.noise, unit.unit, run, NAME)
+    noise = required_noise(unit.noise, unit.unit, run, f"format {NAME}")
     factor = STANDARD_GRAVITY_M_S2 / MICRO
     rate = settings.rate_hz or noise.rate_hz
     density, walk, flicker = (factor * noise.value[symbol] for symbol in ("N", "K", "B"))

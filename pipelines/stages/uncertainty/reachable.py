@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr
 
 from inertial import design
 from inertial.arrays import Array, Index
 from inertial.state import State
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
-from inertial.uncertainty.propagation import Propagated, fit_design, norm_errors, propagated, rms_over
+from inertial.uncertainty.propagation import FitDesign, Propagated, fit_design, norm_errors, propagated, rms_over
 from pipelines.stages.uncertainty.budget import with_device_temperature
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.contributions import DwellConditions, influences
@@ -21,6 +22,8 @@ from schemas.units import AXES, MICRO
 
 LEAST_SHARE = 0.01
 """Smallest share of a contribution that a reason names."""
+LEAST_MARGIN = 2.0
+"""Between limit and U, in standard deviations of the error by noise: less fails one good unit in twenty, or more."""
 FIGURES = {
     "bias_error": ("bias_error_ug", 1.0),
     LARGEST_ERROR: ("bias_error_period_ug", 1.0),
@@ -40,6 +43,7 @@ class PlannedDwells:
     fit, verification : states, (n,) and (m,); soak, target_C : (n,), of the fit's
     covariance : (n, n), of the dwells of the fit, g²; run_ug : expected error of a dwell within the run
     instability_ug : bias instability B of the device
+    joint : (n + m, n + m), covariance of the dwells of the fit, then of the verification, g²; None: no noise
     """
 
     fit: State
@@ -49,6 +53,7 @@ class PlannedDwells:
     covariance: Array
     run_ug: float
     instability_ug: float
+    joint: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,7 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
                 own = float(np.sqrt(noise[axis, column, column]))
                 out.append(_reach(effect, letter, unit, own, propagation.coefficients[axis, column], names))
     if planned.verification is not None:
-        out += _errors(planned, terms, nominal, propagation, names)
+        out += _errors(planned, terms, nominal, propagation, names, fit)
     return out
 
 
@@ -123,9 +128,14 @@ def _combined(parts: dict[str, float]) -> float:
 
 
 def _errors(
-    planned: PlannedDwells, terms: BudgetTerms, model: MeasurementModel, propagation: Propagated, names: Array
+    planned: PlannedDwells,
+    terms: BudgetTerms,
+    model: MeasurementModel,
+    propagation: Propagated,
+    names: Array,
+    fit: FitDesign,
 ) -> list[Reach]:
-    """RMS error for the user, by the references alone, and over the period."""
+    """RMS error for the user, by the references alone, and over the period; error in a pose of the verification."""
     state = planned.verification
     if state is None:
         return []
@@ -152,15 +162,37 @@ def _errors(
         worst = max((one for one in out if one.quantity == "bias_error_period"), key=lambda one: one.u)
         _, bound = largest_error(axes, terms.switch_on_dof)
         out.append(Reach(LARGEST_ERROR, BOUND, "µg", float(bound[0]), worst.parts))
-    return [*out, _norm(errors, state, names)]
+    noise = {} if planned.joint is None else {"noise": _noise_of_pose(planned.joint, columns, fit, state)}
+    return [*out, _norm(errors, state, names, noise)]
 
 
-def _norm(errors: Array, state: State, names: Array) -> Reach:
-    """Magnitude at the pose of the verification where it is least certain."""
+def _noise_of_pose(joint: Array, columns: Array, fit: FitDesign, state: State) -> float:
+    """Standard deviation, µg, of the magnitude's error by noise, mean over the dwells of the pose where it is largest.
+
+    White noise and wander of these dwells, and of those of the fit through the coefficients of a device of response 1, as the
+    verification of a run states it (:func:`pipelines.stages.verify.verify`); what a lot shares of the station is left out.
+
+    columns : (3, m, p), of the verification
+    """
+    force = design.of_axes(state.force, state.axes, -1)
+    toward = force / np.linalg.norm(force, axis=-1, keepdims=True)
+    to_dwells = np.concatenate(
+        [-columns @ fit.gain, np.broadcast_to(np.eye(len(force)), (*columns.shape[:2], len(force)))], -1
+    )
+    expected = to_dwells @ joint @ np.swapaxes(to_dwells, -1, -2)
+    along = np.einsum("ja,ajk,ka->jk", toward, expected, toward)
+    _, pose = np.unique(force.round(9), axis=0, return_inverse=True)
+    mean = (pose == np.arange(pose.max() + 1)[:, None]) / np.bincount(pose)[:, None]
+    return MICRO * float(np.sqrt(np.max(np.einsum("pj,jk,pk->p", mean, along, mean))))
+
+
+def _norm(errors: Array, state: State, names: Array, noise: dict[str, float]) -> Reach:
+    """Magnitude at the pose of the verification where it is least certain, with its noise."""
     along = MICRO * norm_errors(errors, design.of_axes(state.force, state.axes, -1))
     worst = along[int(np.argmax(np.sum(along**2, axis=-1)))]
     parts = {group: float(np.sqrt(np.sum(worst[names == group] ** 2))) for group in dict.fromkeys(names.tolist())}
-    return Reach("verification_norm", "norm", "µg", float(np.sqrt(np.sum(worst**2))), parts)
+    parts |= noise
+    return Reach("verification_norm", "norm", "µg", _combined(parts), parts)
 
 
 def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[str]:
@@ -188,6 +220,24 @@ def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[s
             rulers = ", ".join(f"{LABELS[name]} {100.0 * share:.0f} %" for name, share in shares)
             out.append(f"{figure}: limit {shown(needed)} {unit}, {what} {shown(reached)} {unit} ({rulers})")
     return out
+
+
+def at_risk(reaches: Sequence[Reach], limits: Limits) -> list[str]:
+    """The limit of a pose of verification that noise alone makes good units miss, a sentence; it can be met."""
+    figure, one = "verification_norm_ug", next((r for r in reaches if r.quantity == "verification_norm"), None)
+    limit = limits.figures[figure].max if figure in limits.figures else None
+    if one is None or limit is None:
+        return []
+    expanded = limits.guard_factor * one.u
+    noise = one.parts.get("noise", 0.0)
+    if not 0.0 < limit - expanded < LEAST_MARGIN * noise:
+        return []
+    share, k = 2.0 * ndtr(-(limit - expanded) / noise), limits.coverage_factor
+    text = (
+        f"{figure}: limit {shown(limit)} µg, U (k = {k:g}) {shown(k * one.u)} µg; by noise alone {100.0 * share:.0f} % of good "
+        "units or more fail; add soaks, poses of the fit or repetitions of the verification"
+    )
+    return [text]
 
 
 def shown(value: float) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from capture_double import small_job, small_run
+from in_process import refused
 
 from pipelines.archive import Archive, Run, files, parquet, stage_key
 from pipelines.archive.code import CODE
@@ -87,8 +88,15 @@ def test_a_table_changed_behind_the_archives_back_is_found(tmp_path: Path) -> No
     path.write_bytes(path.read_bytes()[:-7])
     with pytest.raises(ArchiveUnusable, match="truncated or has changed"):
         list(Runner(small_job(tmp_path), run.archive, measure=_never).all())
-    with pytest.raises(ArchiveUnusable, match="not a whole Parquet file"):
-        run.table("coefficients")
+    own = ("--archive", run.archive.root)
+    message = refused("show", run.id, "coefficients", *own)
+    assert "is not a whole Parquet file" in message
+    assert f"or remove {run.path} and make the run again: its capture is kept" in message
+    samples = next((run.archive.root / "captures").glob("*/00003/samples.parquet"))
+    samples.write_bytes(samples.read_bytes()[:-7])
+    capture = samples.parent.parent
+    with pytest.raises(ArchiveUnusable, match=rf"backup' made, or remove {capture} and measure again with"):
+        parquet.read_table(samples, "samples")
 
 
 def test_finds_a_run_by_its_beginning_and_the_latest_and_names_what_is_close(run: Run) -> None:

@@ -181,7 +181,7 @@ def test_effects_that_must_be_visible_keep_the_lot_going(run: Run, tmp_path: Pat
 @pytest.mark.parametrize(
     ("bias", "more", "message"),
     [
-        (0.001, "", "[stop] asks for U = 0.001 of bias, the references alone have U ="),
+        (0.001, "", "[stop] asks for U = 0.001 µg of bias, the references alone have U ="),
         (800.0, 'visible = ["no_such"]', "no_such"),
         (800.0, 'visible = ["bias"]', "key 'stop.visible': bias in the model, effects beside it are needed"),
         (800.0, 'visible = ["bias_temperature"]', "the whole plan does not show bias_temperature"),
