@@ -65,7 +65,7 @@ def _budget(reach: dict[str, Any] | None) -> str:
     titles = {
         "bias_error": "error by the references",
         "bias_error_period": "error over the period",
-        "verification_norm": "error in a verification pose",
+        "verification_norm": "error in a verification pose, with noise",
     }
     worst.pop(LARGEST_ERROR, None)  # made of the same contributions
     return shares_plot(
