@@ -191,7 +191,7 @@ def test_its_plan_speaks_of_one_axis(measured) -> None:
     text = " ".join(text_of("plan", folder / "one.toml").split())
     for name in ("Kxy", "Kxz"):
         assert f"misalignment {name}, µg/g" in text
-    assert "error in a verification pose all" in text
+    assert "error in a verification pose, with noise all" in text
     for words in ("magnitude", ">norm<", "verification norm", ", norm"):
         assert words not in page
 
