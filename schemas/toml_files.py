@@ -88,7 +88,8 @@ def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> Re
         wrong = str(first["loc"][-1])
         message = f"{source}: unknown key '{key}'; {did_you_mean(wrong, known)}"
         return RecipeInvalid(message, key=key, close=close_matches(wrong, known))
-    place = next((f", number {part + 1}" for part in first["loc"] if isinstance(part, int)), "")
+    numbers = [part for part in first["loc"] if isinstance(part, int)]
+    place = f", number {numbers[0] + 1}" if numbers and first["loc"][0] == "poses" else ""
     return RecipeInvalid(f"{source}: {_sentence(first, key, place)}", key=key)
 
 

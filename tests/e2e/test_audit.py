@@ -202,7 +202,7 @@ def test_what_cannot_be_audited_is_refused(made, tmp_path):
     words = ("audit", "--archive", made)
     assert "did you mean ADXL355?" in refused(*words, "--device", "ADXL335")
     assert "a period is needed" in refused(*words, "--since", "2024-01-01", "--until", "2023-01-01")
-    assert "has no calibration" in refused("audit", "--archive", tmp_path / "none")
+    assert "holds no archive" in refused("audit", "--archive", tmp_path / "none")
 
 
 def test_rules_say_what_is_wrong_with_them(tmp_path):

@@ -31,6 +31,8 @@ ELSEWHERE = {
     "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
     "demo": HERE + "test_the_lines_of_the_demonstration_run_by_hand",
     "certificate_issue": "tests/unit/pipelines/cli/test_next_commands.py::test_the_line_about_documents_names_the_archive",
+    "export": "tests/unit/pipelines/certificates/test_statement.py"
+    "::test_failed_units_are_marked_in_their_files_and_no_certificate_is_offered_for_them",
     "plan_text": "tests/e2e/test_plan.py::test_the_line_after_a_search_measures_the_new_recipe",
 }
 """Where the lines of a module are run that prints them after minutes only, or after several commands."""

@@ -46,6 +46,7 @@ QUANTITIES = {
 }
 OF_FEWER_AXES = {
     QUANTITIES["verification_norm"]: "error of the corrected output, verification (largest of the poses)",
+    "error of |a|": "error",
 }
 """Words for the norm of gravity, of a device that has no three axes to measure it."""
 BUDGETS = ("bias", "scale", "output", "bias_error_period")

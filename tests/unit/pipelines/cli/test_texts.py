@@ -37,7 +37,7 @@ def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypat
     said = refused(["plan", hot], tmp_path, monkeypatch)
     assert "'tumbleline run' refuses this recipe" in said
     assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in said
-    assert CliRunner().invoke(app, ["plan", hot]).exit_code == 0  # a plan tells and does not refuse
+    assert CliRunner().invoke(app, ["plan", hot]).exit_code == 1  # a plan tells what a run refuses
     units = load_recipe(recipe).units
     for bad in ("LN 01", ""):
         serials = recipe_file(tmp_path, (f'"{units[0]}"', f'"{bad}"'), name="serials.toml")
