@@ -1,6 +1,6 @@
 """The slow noise of simulated units apart from the white one: what a bias as the mean of its record is the bias of."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import numpy as np
@@ -30,7 +30,7 @@ class _Kept(ApartNoise):
 
 
 @contextmanager
-def kept() -> Iterator[list[_Kept]]:
+def kept() -> Generator[list[_Kept]]:
     """Within it, plants keep the slow noise of what is sampled; the noises of those that were made."""
     made: list[_Kept] = []
 

