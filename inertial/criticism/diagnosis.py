@@ -21,11 +21,25 @@ from inertial.criticism.verdict import Verdict, judged
 from inertial.data_errors.removed_dwells import model_without
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.effects.covariate import Covariate
+from inertial.estimation.alternative import Handling
 from inertial.estimation.comparison import fitted_residuals
 from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.space import Space
+
+
+@dataclass(frozen=True)
+class Suspected:
+    """Effects that explain a residual better than noise does as a rule, but not so clearly that one is named.
+
+    effects : ids, best first; log_p : natural logarithm of the probability, over all looks, that noise explains as much
+    rms_after : of the residuals with the best of them, g
+    """
+
+    effects: tuple[str, ...]
+    log_p: float
+    rms_after: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +51,7 @@ class Diagnosis(Verdict):
     carried : dwells of largest influence: on the first class, or the largest residuals if there is no class
     unseen_in_part : effects that the plan cannot see at some values of their nonlinear parameters, with these
     smallest : the smallest detected size of each effect, those that slow noise hides most first
+    suspected : None, or what a model that fails without a named cause lacks most probably
     """
 
     where: tuple[Misfit, ...]
@@ -47,6 +62,7 @@ class Diagnosis(Verdict):
     smallest: tuple[Smallest, ...]
     evidence: Evidence
     without_removed: bool | None
+    suspected: Suspected | None
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -83,7 +99,19 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
         carried=every[0].carried if every else _residuals(base, fields, None if silent else rng),
         evidence=evidence(base, fields),
         without_removed=(None if verdict.unjudged else verdict.sound) if verdict.removed else None,
+        suspected=None if verdict.found or verdict.adequate is not False else _suspected(verdict),
     )
+
+
+def _suspected(verdict: Verdict) -> Suspected | None:
+    """The effects of the first step of the search that noise seldom explains; None where an error of handling is before them."""
+    enough = np.log(ADEQUATE_ABOVE / max(verdict.search.field.looks, 1))
+    seldom = [rival for rival in verdict.result.ladder if rival.log_p < enough]
+    if not seldom or any(isinstance(rival.term.effect, Handling) for rival in seldom):
+        return None
+    left = rms_of(fitted_residuals(verdict.base.with_term(seldom[0].term)))
+    over_all = seldom[0].log_p - float(enough) + float(np.log(ADEQUATE_ABOVE))
+    return Suspected(tuple(rival.term.effect.id for rival in seldom), over_all, left)
 
 
 def _beyond_pose(base: Model, drivers: Sequence[Driver], final: Model) -> Space:

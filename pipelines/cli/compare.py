@@ -31,7 +31,9 @@ def command(
     as_json: options.JsonOption = False,
 ) -> None:
     """Fit a model to dwells; state its error there, on dwells left out, and on a fresh run with the coefficients unchanged."""
-    from pipelines.cli.inputs import add_effects, both_runs, without_dwells
+    from pipelines.cli.inputs import add_effects, both_runs, start_reader, without_dwells
+
+    start_reader(dwells, fresh)
     from pipelines.diagnosis.compare import compare
     from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.inputs import judged_effects

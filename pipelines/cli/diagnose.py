@@ -57,7 +57,10 @@ def command(
     Exit status 0: the model is adequate. 1: it is not, it cannot be judged, or every unit has a data fault. 2: the input cannot
     be used.
     """
-    from pipelines.cli.inputs import add_effects, dwells_and_history, without_dwells
+    from pipelines.cli.inputs import add_effects, dwells_and_history, start_reader, without_dwells
+
+    start_reader(dwells)
+    import pipelines.diagnosis.diagnose  # noqa: F401 - while the reader starts
     from pipelines.diagnosis.inputs import file_beside, judged_effects
     from pipelines.importers.files import is_file
 

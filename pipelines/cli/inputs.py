@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive
 from pipelines.cli.printing import remark
+from schemas.foreign import is_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,6 +28,14 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
     if file and not history:
         remark(f"history: {file}, found beside the dwells")
     return dwells, temperatures
+
+
+def start_reader(*sources: str) -> None:
+    """Start the process that reads files, where one is named, while this process imports the libraries of its command."""
+    from pipelines.importers import limited
+
+    if any(is_file(source) for source in sources if source):
+        limited.start()
 
 
 def without_dwells(dwells: pd.DataFrame, listed: str) -> tuple[pd.DataFrame, list[str]]:

@@ -181,6 +181,16 @@ class SmallestNamed(TypedDict):
     without_slow_noise_ug: Annotated[float, "with its white part only, µg"]
 
 
+class SuspectedEffects(TypedDict):
+    """What a model that fails without a named cause lacks most probably."""
+
+    effects: Annotated[list[str], "best first"]
+    p_value: Annotated[float, "probability, over all effects tried, that noise explains as much"]
+    named_below: Annotated[float, "probability below which an effect is named"]
+    rms_after_ug: Annotated[float, "residual with the first of them, µg"]
+    breaker: Annotated[str, "measurement that decides it"]
+
+
 class SuggestedFormula(TypedDict):
     """A formula for a model file that follows the unexplained quantity."""
 
@@ -205,6 +215,9 @@ class DiagnosisDocument(TypedDict):
     smallest_named: Annotated[list[SmallestNamed], "those that slow noise hides most first"]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
+    suspected: NotRequired[
+        Annotated[SuspectedEffects | None, "null: something is named, or noise explains as much as a rule"]
+    ]
     reason: NotRequired[Annotated[str | None, "why it cannot be judged; null: it can"]]
     evidence: NotRequired[VerdictEvidence | None]
     leave_out: NotRequired[Annotated[LeaveOut | None, "null: no such dwell"]]

@@ -10,6 +10,7 @@ from inertial.criticism.diagnosis import Diagnosis, Named
 from inertial.criticism.examination import ExaminedRun
 from inertial.criticism.influence import CarriedEvidence
 from inertial.data_errors.removed_dwells import BadDwell
+from inertial.decisions import NAMED_BELOW
 from inertial.estimation.comparison import fitted_residuals, rms
 from inertial.estimation.likelihood import correlation_of_units
 from inertial.estimation.model import Model
@@ -271,3 +272,17 @@ def _plausible(size: float, typical: tuple[float, float]) -> bool:
     """Whether a size in g is in the usual range of the effect, or down to a tenth of it."""
     # the size of an effect within the noise is not judged
     return size <= 0.0 or 0.1 * typical[0] <= MICRO * size <= typical[1]
+
+
+def suspected_of(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """What a model that fails without a named cause lacks most probably; None where nothing is suspected."""
+    suspected = diagnosis.suspected
+    if suspected is None:
+        return None
+    return {
+        "effects": list(suspected.effects),
+        "p_value": probability(suspected.log_p),
+        "named_below": NAMED_BELOW,
+        "rms_after_ug": MICRO * suspected.rms_after,
+        "breaker": catalogue.get(suspected.effects[0]).breaker,
+    }

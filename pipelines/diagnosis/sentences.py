@@ -45,8 +45,12 @@ def verdict(document: dict[str, Any]) -> str:
         return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
     if named:
         return f"{told}; missing: {', and '.join(named)}."
-    rest = document.get("reason") or (
-        "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
+    rest = (
+        document.get("reason")
+        or suspected_text(document)
+        or (
+            "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
+        )
     )
     if document["unexplained"]:
         rest = f"{document['unexplained']['text']}, and no effect of the catalogue explains it"
@@ -236,6 +240,18 @@ def unexplained_text(document: dict[str, Any]) -> str:
     shape = "" if unexplained.get("period_s") else f" as a {unexplained['shape']}"
     of_table = _without_angles(document) if unexplained["driver"] == "pose" else ""
     return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])}).{of_table}"
+
+
+def suspected_text(document: dict[str, Any]) -> str:
+    """What the model lacks most probably where nothing is named, and what decides it; empty where nothing is suspected."""
+    suspected = document.get("suspected")
+    if not suspected:
+        return ""
+    names, left = " or ".join(suspected["effects"]), short(suspected["rms_after_ug"])
+    return (
+        f"suspected, but not named: {names}, which leaves {left} µg (p {equal(suspected['p_value'])} that noise explains as "
+        f"much, p < {suspected['named_below']:g} is needed); to decide it: {suspected['breaker']}"
+    )
 
 
 def not_recorded(reason: str) -> str:

@@ -4,10 +4,11 @@ import lots
 import numpy as np
 import pytest
 
+from benchmarks.hand_turned import make as turned_by_hand
 from inertial import frames
 from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.diagnose import default_model, diagnose, examination
-from pipelines.diagnosis.sentences import unexplained_text
+from pipelines.diagnosis.sentences import unexplained_text, verdict
 from schemas.errors import DataRejected
 
 
@@ -86,3 +87,18 @@ def test_effects_of_a_table_are_told_to_be_untried_where_its_angles_are_missing(
     assert "angles" not in told[0]
     assert "backlash" in told[1]
     assert "record outer_deg and inner_deg" in told[1]
+
+
+def test_an_effect_that_noise_seldom_explains_is_suspected_with_what_decides_it_where_none_is_named() -> None:
+    """Preisach's operator in 39 dwells of one unit: beside a random walk the evidence does not reach that of a name."""
+    document = examination(turned_by_hand("hysteresis", 9101), None, None).document
+    suspected = document["suspected"]
+    assert document["adequate"] is False
+    assert not document["recommended"]
+    assert suspected["effects"] == ["thermal_hysteresis"]
+    assert suspected["named_below"] < suspected["p_value"] < 0.05
+    assert suspected["rms_after_ug"] < 0.3 * document["error"]["rms_ug"]
+    assert "suspected, but not named: thermal_hysteresis" in verdict(document)
+    assert "closed loop of temperature" in verdict(document)
+    for named in (turned_by_hand("lag", 9100), turned_by_hand("nothing_4min", 9100)):
+        assert diagnose(named)["suspected"] is None
