@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class EffectClass:
     alike: bool = False
 
     @property
-    def scope(self) -> str:
+    def scope(self) -> Literal["sensor", "slot", "station", "sensor or station", "data"]:
         """Where the cause is: "data", "sensor", "slot", "station", or "sensor or station" where the lot cannot tell."""
         if self.of_data:
             return "data"

@@ -20,6 +20,7 @@ from schemas.progress import Progress
 if TYPE_CHECKING:
     from pipelines.demo.measure import DemoLot
     from pipelines.demo.scenes import Scene
+    from pipelines.diagnosis.documents import DiagnosisDocument
 
 PART = "Start here"
 ORDER = 50
@@ -225,7 +226,7 @@ class _Game:
             print_comparison(document, poses=0)
         return document
 
-    def _diagnose(self) -> dict[str, Any]:
+    def _diagnose(self) -> DiagnosisDocument:
         from pipelines.cli.diagnose import diagnosed
         from pipelines.cli.text.diagnosis_text import print_diagnosis
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from pipelines.diagnosis.diagnose import Examination
+    from pipelines.diagnosis.documents import DiagnosisDocument
     from schemas.recipe import Recipe
 
 PART = "Is the model good enough, and what is missing?"
@@ -60,7 +62,7 @@ def command(
     from pipelines.cli.inputs import add_effects, dwells_and_history, start_reader, without_dwells
 
     start_reader(dwells)
-    import pipelines.diagnosis.diagnose  # noqa: F401 - while the reader starts
+    import_module("pipelines.diagnosis.diagnose")  # while the reader starts
     from pipelines.diagnosis.inputs import file_beside, judged_effects
     from pipelines.importers.files import is_file
 
@@ -133,7 +135,7 @@ def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
     return job_of_run(Archive(archive).run(dwells)).recipe
 
 
-def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, source: str) -> None:
+def write_next(path: Path, document: DiagnosisDocument, base: Recipe, home: Path, source: str) -> None:
     """Write the proposed measurement as a recipe and print its path; without proposed steps nothing is written.
 
     base : the recipe that the dwells were measured with; home : its folder

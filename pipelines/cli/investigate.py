@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from pipelines.archive import Archive
 from pipelines.cli import options
@@ -15,6 +15,7 @@ from pipelines.cli.run import shown
 from pipelines.cli.text.verdict_text import print_verdict
 
 if TYPE_CHECKING:
+    from pipelines.inquiry.documents import InquiryDocument
     from pipelines.inquiry.inquiry import FollowUp, Inquiry
     from pipelines.inquiry.lineage import JointDiagnosis
     from pipelines.inquiry.loop import Consent
@@ -110,7 +111,7 @@ def _answer(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
     return "go" if agreed(text) else "stop"
 
 
-def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
+def print_inquiry(document: InquiryDocument, archive: str | None = None) -> None:
     """Print an inquiry; ``archive`` as it was given, for the commands to give next."""
     from pipelines.cli.text.diagnosis_text import print_findings, print_next_measurement
 
@@ -123,12 +124,12 @@ def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
     )
     if document["ended"] in {"asked", "declined"}:
         print_next_measurement(document["next_measurements"])
-        print_next([document["command"]])
+        print_next([command for command in (document.get("command"),) if command])
     else:
         print_extension(document, partial(judged_data, document["run"], "", Given(archive)), None)
 
 
-def _rounds(document: dict[str, Any]) -> None:
+def _rounds(document: InquiryDocument) -> None:
     minutes = document["minutes"]
     first, further = short(minutes["first_run"]), short(minutes["follow_ups"]) or "0"
     say(

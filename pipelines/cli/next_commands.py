@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from pipelines.archive import Archive, Run
 from pipelines.cli.printing import say
+from pipelines.diagnosis.documents import DiagnosisDocument
 from pipelines.diagnosis.sentences import UNSEEN
 
 PROGRAM = "tumbleline"
@@ -157,7 +157,7 @@ def print_next(lines: Sequence[str]) -> None:
             say(f"  {line}")
 
 
-def print_next_of_diagnosis(document: dict[str, Any], find: FindData, model: Path | None) -> None:
+def print_next_of_diagnosis(document: DiagnosisDocument, find: FindData, model: Path | None) -> None:
     """Print the commands after a diagnosis: the recipe that decides, and the effects that are added, or the formula to judge.
 
     find : gives the data; called only where there is something to do: to look for a fresh run takes a second
@@ -186,13 +186,13 @@ def print_next_of_diagnosis(document: dict[str, Any], find: FindData, model: Pat
     print_next(lines)
 
 
-def print_extension(document: dict[str, Any], find: FindData, model: Path | None) -> None:
+def print_extension(document: DiagnosisDocument, find: FindData, model: Path | None) -> None:
     """Print the commands that add the recommended effects of a diagnosis and judge them; see :func:`print_next_of_diagnosis`."""
     if document["recommended"]:
         print_next(_extension(document, find(), model))
 
 
-def _extension(document: dict[str, Any], data: JudgedData, model: Path | None) -> list[str]:
+def _extension(document: DiagnosisDocument, data: JudgedData, model: Path | None) -> list[str]:
     """The commands that add the recommended effects; what they lack is printed before them."""
     file = model or free_name()
     new = not (model and model.exists())

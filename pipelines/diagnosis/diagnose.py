@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,8 +15,9 @@ from inertial.errors import InertialError
 from inertial.planning.reasons import reason
 from pipelines.diagnosis import result_rows
 from pipelines.diagnosis.compare import without_history
+from pipelines.diagnosis.documents import BlockingFault, DiagnosisDocument
 from pipelines.diagnosis.next_measurement import Proposed, proposed
-from pipelines.diagnosis.suggested_formula import as_toml, offer, what_follows
+from pipelines.diagnosis.suggested_formula import offer, what_follows
 from pipelines.parallel import keep_memory
 from pipelines.tables.dwells import Measured, shows_misalignment, undetermined_responses
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot, told
@@ -57,7 +57,7 @@ def _of_temperature(dwells: pd.DataFrame) -> list[str]:
 
 def diagnose(
     dwells: pd.DataFrame, history: pd.DataFrame | None = None, effects: Sequence[str] | None = None
-) -> dict[str, Any]:
+) -> DiagnosisDocument:
     """The diagnosis of a lot as a JSON document.
 
     Parameters
@@ -71,8 +71,7 @@ def diagnose(
     DataRejected
         Nothing is left to diagnose, or the dwells lack a quantity of the model.
     """
-    with threadpool_limits(1):  # as in the search: the next measurement is found by small matrices, too
-        return document(*examined(dwells, history, effects))
+    return examination(dwells, history, effects).document
 
 
 def examined(
@@ -104,13 +103,15 @@ def document(
     measurement: Measured,
     faults: list[Fault],
     diagnosis: Diagnosis | None,
+    effects: Sequence[str],
     following: Proposed | None = None,
     left_out: Collection[str] = (),
-) -> dict[str, Any]:
+) -> DiagnosisDocument:
     """The document of a diagnosis; if every unit has a data fault, no effect is judged.
 
     Parameters
     ----------
+    effects : ids of the judged model
     following : what to measure next; by the capabilities of the station that the run shows if None
     left_out : ``UNIT:DWELL``, removed on purpose: no notice says that they are missing
     """
@@ -135,6 +136,12 @@ def document(
             "unseen_in_part": [],
             "smallest_named": [],
             "next_measurements": [],
+            "warnings": [],
+            "effects": list(effects),
+            "units": list(measurement.units),
+            "breakers": {},
+            "reasons": {},
+            "offer": None,
         }
     faulty = {f.unit for f in faults}
     units = tuple(u for k, u in enumerate(measurement.units) if k not in faulty)
@@ -148,14 +155,16 @@ def document(
         *result_rows.noise_of_the_lot(diagnosis.final, len(units)),
     ]
     error = error_of(diagnosis.rms, diagnosis.floor, diagnosis.log_p)
-    adequate, reason, error = told(diagnosis.base, diagnosis.adequate, diagnosis.unjudged, error)
+    adequate, why, error = told(diagnosis.base, diagnosis.adequate, diagnosis.unjudged, error)
     return {
         "adequate": adequate,
-        "reason": reason or None,
+        "reason": why or None,
         "blocked_by": blocked,
         "evidence": result_rows.evidence_of(diagnosis, names),
         "error": {
-            **error,
+            "rms_ug": error["rms_ug"],
+            "floor_ug": error["floor_ug"],
+            "p_value": error["p_value"],
             "white_noise_ug": result_rows.white_noise_of(diagnosis.base),
             **result_rows.noise_of(diagnosis.final),
         },
@@ -185,10 +194,15 @@ def document(
         "unseen_in_part": result_rows.in_part_of(diagnosis),
         "smallest_named": result_rows.smallest_of(diagnosis),
         "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
+        "effects": list(effects),
+        "units": list(measurement.units),
+        "breakers": {name: catalogue.get(name).breaker for name in diagnosis.unseen},
+        "reasons": {name: reason(diagnosis.problem.lot.state, name, effects) for name in diagnosis.unseen},
+        "offer": None if diagnosis.unexplained is None else offer(diagnosis.unexplained, diagnosis.problem.lot.state),
     }
 
 
-def _fault(measurement: Measured, fault: Fault) -> dict[str, Any]:
+def _fault(measurement: Measured, fault: Fault) -> BlockingFault:
     return {
         "fault": fault.name,
         "units": [measurement.units[fault.unit]],
@@ -205,7 +219,7 @@ class Examination:
     measured, diagnosis : the readings, and their diagnosis; None if every unit has a data fault
     """
 
-    document: dict[str, Any]
+    document: DiagnosisDocument
     measured: Measured
     diagnosis: Diagnosis | None
 
@@ -233,22 +247,5 @@ def examination(
     keep_memory()
     with threadpool_limits(1):
         measurement, faults, diagnosis = examined(table, history, effects, left_out)
-        content = {
-            **document(measurement, faults, diagnosis, left_out=left_out),
-            **report_fields(measurement.units, effects, diagnosis),
-        }
+        content = document(measurement, faults, diagnosis, effects, left_out=left_out)
     return Examination(content, measurement, diagnosis)
-
-
-def report_fields(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
-    """Keys of the document beyond the fixed ones: the judged model, breakers of unseen effects, the suggested formula."""
-    extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
-    if diagnosis is None:
-        return extras
-    extras["breakers"] = {name: catalogue.get(name).breaker for name in diagnosis.unseen}
-    state = diagnosis.problem.lot.state
-    extras["reasons"] = {name: reason(state, name, effects) for name in diagnosis.unseen}
-    if diagnosis.unexplained is not None:
-        formula = offer(diagnosis.unexplained, diagnosis.problem.lot.state)
-        extras["offer"] = None if formula is None else {**formula, "toml": as_toml(formula)}
-    return extras

@@ -18,7 +18,17 @@ class BlockingFault(TypedDict):
     evidence: str
 
 
-class ErrorFigures(TypedDict):
+class NoiseFigures(TypedDict):
+    """The noise that was estimated; missing where every unit has a data fault."""
+
+    wander_share: NotRequired[Annotated[float, "variance of the 1/f noise over that of the white noise"]]
+    walk_share: NotRequired[
+        Annotated[float, "variance of the random walk at the end of the run over that of the white noise"]
+    ]
+    noise_spread: NotRequired[Annotated[float, "largest standard deviation of a unit and axis over the smallest"]]
+
+
+class ErrorFigures(NoiseFigures):
     """Residual of the model; null where every unit has a data fault."""
 
     rms_ug: Annotated[float | None, "root mean square residual of the units without a fault, µg"]
@@ -27,11 +37,6 @@ class ErrorFigures(TypedDict):
     ]
     white_noise_ug: NotRequired[Annotated[float | None, "white noise alone, from the samples of each dwell, µg"]]
     p_value: Annotated[float | None, "probability of such a residual if the model is adequate, at least 1e-300"]
-    wander_share: NotRequired[Annotated[float, "variance of the 1/f noise over that of the white noise"]]
-    walk_share: NotRequired[
-        Annotated[float, "variance of the random walk at the end of the run over that of the white noise"]
-    ]
-    noise_spread: NotRequired[Annotated[float, "largest standard deviation of a unit and axis over the smallest"]]
 
 
 class FailingDriver(TypedDict):
@@ -75,15 +80,15 @@ class EffectClassDocument(TypedDict):
     heldout_before_ug: NotRequired[Annotated[float | None, "the same without the effect, µg"]]
     p_value: float
     size_ug: Annotated[float, "size of the effect, µg"]
-    nonlinear: NotRequired[Annotated[dict[str, Any], "estimated time constants, widths, …"]]
+    nonlinear: Annotated[dict[str, Any], "estimated time constants, widths, …"]
     nonlinear_of: NotRequired[Annotated[str | None, "the effect of the class that they belong to"]]
     nonlinear_interval: NotRequired[Annotated[dict[str, Any], "68 % interval of each that all axes share"]]
-    plausible: NotRequired[Annotated[bool, "whether the size is in the usual range of the effect"]]
+    plausible: Annotated[bool, "whether the size is in the usual range of the effect"]
     units: NotRequired[Annotated[list[str], "of scope data: the units concerned"]]
     dwells: NotRequired[Annotated[list[int], "of scope data: the dwells concerned"]]
     evidence: NotRequired[Annotated[str, "of scope data: description of the fault"]]
-    influence: NotRequired[Annotated[list[InfluentialDwell], "dwells with the largest influence on this class"]]
-    without_influence: NotRequired[Annotated[WithoutInfluence | None, "the verdict on this class without these dwells"]]
+    influence: Annotated[list[InfluentialDwell], "dwells with the largest influence on this class"]
+    without_influence: Annotated[WithoutInfluence | None, "the verdict on this class without these dwells"]
 
 
 class StudentisedDwell(NamedDwell):
@@ -132,9 +137,9 @@ class UnexplainedExcess(TypedDict):
     driver: str
     shape: str
     p_value: float
-    part: NotRequired[Annotated[str, "what follows the driver: bias, scale, axes or transfer, the transfer curve"]]
-    text: NotRequired[Annotated[str, "the same as a sentence without its end"]]
-    period_s: NotRequired[Annotated[float | None, "of a swing with the time, s; null of another curve"]]
+    part: Annotated[str, "what follows the driver: bias, scale, axes or transfer, the transfer curve"]
+    text: Annotated[str, "the same as a sentence without its end"]
+    period_s: Annotated[float | None, "of a swing with the time, s; null of another curve"]
 
 
 class NextMeasurement(TypedDict):
@@ -215,26 +220,22 @@ class DiagnosisDocument(TypedDict):
     smallest_named: Annotated[list[SmallestNamed], "those that slow noise hides most first"]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
-    suspected: NotRequired[
-        Annotated[SuspectedEffects | None, "null: something is named, or noise explains as much as a rule"]
+    suspected: Annotated[SuspectedEffects | None, "null: something is named, or noise explains as much as a rule"]
+    reason: Annotated[str | None, "why it cannot be judged; null: it can"]
+    evidence: VerdictEvidence | None
+    leave_out: Annotated[LeaveOut | None, "null: no such dwell"]
+    without_influence: Annotated[
+        WithoutInfluence | None,
+        "the verdict without the dwells of `influence`: on the first class; on the model where nothing is named",
     ]
-    reason: NotRequired[Annotated[str | None, "why it cannot be judged; null: it can"]]
-    evidence: NotRequired[VerdictEvidence | None]
-    leave_out: NotRequired[Annotated[LeaveOut | None, "null: no such dwell"]]
-    without_influence: NotRequired[
-        Annotated[
-            WithoutInfluence | None,
-            "the verdict without the dwells of `influence`: on the first class; on the model where nothing is named",
-        ]
-    ]
-    removed: NotRequired[RemovedDwells | None]
-    warnings: NotRequired[list[str]]
+    removed: RemovedDwells | None
+    warnings: list[str]
+    effects: Annotated[list[str], "the model that was judged"]
+    units: list[str]
+    breakers: Annotated[dict[str, str], "per unseen effect, measurement that shows it"]
+    reasons: Annotated[dict[str, str], "per unseen effect, the reason why this plan does not show it"]
+    offer: SuggestedFormula | None
     history: NotRequired[Annotated[str | None, "file of the temperature history that was read"]]
-    effects: NotRequired[Annotated[list[str], "the model that was judged"]]
-    units: NotRequired[list[str]]
-    breakers: NotRequired[Annotated[dict[str, str], "per unseen effect, measurement that shows it"]]
-    reasons: NotRequired[Annotated[dict[str, str], "per unseen effect, the reason why this plan does not show it"]]
-    offer: NotRequired[SuggestedFormula | None]
 
 
 class UnitComparison(TypedDict):

@@ -14,6 +14,7 @@ from inertial.fits.norm_noise import RUN_PER_K
 from inertial.state import T_REFERENCE
 from inertial.uncertainty.rounding import equal, rounded
 from pipelines.diagnosis.diagnose import default_model, diagnose
+from pipelines.diagnosis.documents import DiagnosisDocument, ErrorFigures, LeaveOut, VerdictEvidence
 from pipelines.diagnosis.imported_faces import six_faces
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
 from pipelines.importers.mapping import Mapping
@@ -104,7 +105,7 @@ def _holds_at(done: FittedNorms) -> float | None:
     return mean if np.isfinite(mean) else None
 
 
-def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, Any]) -> dict[str, Any]:
+def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: DiagnosisDocument) -> dict[str, Any]:
     left = done.fit.left[done.measured.readings.there] / done.gravity
     spread = bias_uncertainty(done)
     to_output = done.scale[0] / MICRO
@@ -137,7 +138,7 @@ def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str,
     }
 
 
-def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, Any], out_unit: str) -> list[str]:
+def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: DiagnosisDocument, out_unit: str) -> list[str]:
     """The fit and the basis of its verdict."""
     error, evidence = verdict["error"], verdict["evidence"]
     count = int(done.measured.readings.there[0].sum())
@@ -186,14 +187,15 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, An
     return lines
 
 
-def _noise_line(error: dict[str, Any], count: int) -> str:
+def _noise_line(error: ErrorFigures, count: int) -> str:
     """Noise and probability; for a long record judged by a part of its dwells also the residual of that part."""
-    white = "" if error.get("white_noise_ug") is None else f" (white noise alone {error['white_noise_ug']:.1f} µg)"
+    recorded = error.get("white_noise_ug")
+    white = "" if recorded is None else f" (white noise alone {recorded:.1f} µg)"
     judged = f"; judged by {MOST} of the dwells, residual {error['rms_ug']:.1f} µg" if count > MOST else ""
     return f"noise of the measurement {error['floor_ug']:.1f} µg{white}; p {equal(error['p_value'])}{judged}"
 
 
-def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dict[str, Any], out_unit: str) -> str:
+def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: VerdictEvidence, out_unit: str) -> str:
     parts = [degrees_of_freedom(evidence["degrees_of_freedom"])]
     if evidence["condition"] is not None:
         parts.append(f"condition {evidence['condition']:.2g}")
@@ -206,7 +208,7 @@ def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dic
     return "; ".join(parts)
 
 
-def _bad_line(out: dict[str, Any], verdict: dict[str, Any]) -> str:
+def _bad_line(out: LeaveOut, verdict: DiagnosisDocument) -> str:
     names = ",".join(f"{d['unit']}:{d['dwell']}" for d in out["dwells"])
     judged = {True: "is adequate", False: "is not adequate", None: "cannot be judged"}[out["adequate_without"]]
     why = f" ({verdict['reason']})" if verdict["reason"] else ""

@@ -15,6 +15,7 @@ from inertial.criticism.diagnosis import Diagnosis
 from inertial.errors import MissingInput
 from inertial.next_measurement.proposals import Circumstances, Proposal, proposal, sighting, twins
 from inertial.planning.sequences import SequenceStep
+from pipelines.diagnosis.documents import NextMeasurement
 from pipelines.diagnosis.sentences import UNSEEN
 from schemas.poses import Pose, SoakPart
 from schemas.recipe import Recipe
@@ -42,9 +43,9 @@ class Proposed:
         """The proposals that separate classes."""
         return tuple(p for _, p in self.parting if p is not None)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[NextMeasurement]:
         """All proposals as rows, in order of measurement."""
-        rows: list[dict[str, Any]] = []
+        rows: list[NextMeasurement] = []
         twins = [*self.twins, *[()] * (len(self.parting) - len(self.twins))]
         for (group, measurement), alike in zip(self.parting, twins, strict=True):
             rows += rows_of(measurement) if measurement is not None else [] if alike else [_breaker(group)]
@@ -80,7 +81,7 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
     return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already), tuple(twin))
 
 
-def _breaker(group: EffectClass) -> dict[str, Any]:
+def _breaker(group: EffectClass) -> NextMeasurement:
     """What separates a class, as text, if no steps of the station do."""
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
@@ -89,39 +90,40 @@ def _breaker(group: EffectClass) -> dict[str, Any]:
     return _without_steps(why)
 
 
-def _without_steps(why: str) -> dict[str, Any]:
+def _without_steps(why: str) -> NextMeasurement:
     outer, inner, temperature = BREAKER_POSE
     return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
 
 
-def rows_of(suggestion: Proposal) -> list[dict[str, Any]]:
+def rows_of(suggestion: Proposal) -> list[NextMeasurement]:
     """Rows of one proposal: consecutive equal steps are one row with their number."""
-    rows: list[dict[str, Any]] = []
-    before: dict[str, Any] | None = None
+    rows: list[NextMeasurement] = []
+    before: NextMeasurement | None = None
     about = " | ".join(suggestion.pair) or f"{UNSEEN}{', '.join(suggestion.ids)}"
     for step in suggestion.steps:
-        row = {
+        row: NextMeasurement = {
             "outer_deg": _degrees(step.outer),
             "inner_deg": _degrees(step.inner),
             "chamber_C": round(step.temperature, 2),
             "why": about,
             "wait_s": round(step.wait, 1),
             "soaked": step.soaked,
-            **({"off_s": round(step.off, 1)} if step.off > 0.0 else {}),
         }
+        if step.off > 0.0:
+            row["off_s"] = round(step.off, 1)
         if row == before:
-            rows[-1]["repeats"] += 1
+            rows[-1]["repeats"] = rows[-1].get("repeats", 1) + 1
         else:
             rows.append({**row, "repeats": 1})
         before = row
-    whole = {
-        "minutes": round(suggestion.minutes, 1),
-        "separation_before": round(suggestion.before, 2),
-        "separation_after": round(suggestion.after, 2),
-        **({"separation_if": {name: round(chi, 2) for name, chi in suggestion.if_true}} if suggestion.if_true else {}),
-        **({"not_parted": list(suggestion.remaining)} if suggestion.remaining else {}),
-    }
-    return [{**row, **whole} for row in rows]
+    for row in rows:
+        row["minutes"] = round(suggestion.minutes, 1)
+        row["separation_before"], row["separation_after"] = round(suggestion.before, 2), round(suggestion.after, 2)
+        if suggestion.if_true:
+            row["separation_if"] = {name: round(chi, 2) for name, chi in suggestion.if_true}
+        if suggestion.remaining:
+            row["not_parted"] = list(suggestion.remaining)
+    return rows
 
 
 def _degrees(angle: float) -> float:
@@ -132,7 +134,7 @@ SAME_SOAK_K = 0.5
 """Steps whose chamber temperature differs by less from the soak before them are part of that soak."""
 
 
-def next_recipe(base: Recipe, rows: Sequence[dict[str, Any]], name: str) -> Recipe:
+def next_recipe(base: Recipe, rows: Sequence[NextMeasurement], name: str) -> Recipe:
     """The recipe ``base`` followed by the proposed steps; its model is that of ``base``.
 
     The proposed steps alone have too few poses for a fit, and their expected χ² includes the dwells so far: both are measured. A
@@ -178,7 +180,7 @@ def next_recipe(base: Recipe, rows: Sequence[dict[str, Any]], name: str) -> Reci
         raise explain(problem, f"recipe {changes['name']}", Recipe) from None
 
 
-def reasons(rows: Sequence[dict[str, Any]]) -> list[str]:
+def reasons(rows: Sequence[NextMeasurement]) -> list[str]:
     """The purposes of the proposed steps, once each; empty without steps."""
     return list(dict.fromkeys(row["why"] for row in rows if row.get("measurable", True)))
 
@@ -195,7 +197,7 @@ def _explicit(base: Recipe, soak: int) -> dict[str, Any]:
     }
 
 
-def _soak_for(soaks: list[dict[str, Any]], row: dict[str, Any]) -> dict[str, Any]:
+def _soak_for(soaks: list[dict[str, Any]], row: NextMeasurement) -> dict[str, Any]:
     """The soak that a step is measured in: the last one at its temperature, else a new one."""
     temperature = float(row["chamber_C"])
     if abs(soaks[-1]["temperature_C"] - temperature) >= SAME_SOAK_K:

@@ -16,6 +16,20 @@ from inertial.estimation.likelihood import correlation_of_units
 from inertial.estimation.model import Model
 from inertial.estimation.refinement import intervals, settled, terms_of
 from inertial.uncertainty.rounding import short
+from pipelines.diagnosis.documents import (
+    EffectClassDocument,
+    InfluentialDwell,
+    LeaveOut,
+    NamedDwell,
+    NoiseFigures,
+    RemovedDwells,
+    SmallestNamed,
+    StudentisedDwell,
+    SuspectedEffects,
+    UnseenInPart,
+    VerdictEvidence,
+    WithoutInfluence,
+)
 from pipelines.tables.sound_lot import probability
 from schemas.units import MICRO
 
@@ -36,7 +50,7 @@ class Names:
     units: tuple[str, ...]
     dwells: tuple[int, ...]
 
-    def at(self, unit: int, dwell: int) -> dict[str, Any]:
+    def at(self, unit: int, dwell: int) -> NamedDwell:
         """A dwell of a unit by its names."""
         return {"unit": self.units[unit], "dwell": self.dwells[dwell]}
 
@@ -46,15 +60,20 @@ def known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
+def classes_of(diagnosis: Diagnosis, names: Names) -> list[EffectClassDocument]:
     """Rows of all classes: handling errors first, because they must be corrected before effects are judged."""
     rows = [_class(n, names) for n in diagnosis.handled]
     rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed if not d.tail]
     fitted = _fitted_parameters(diagnosis)
-    return [*rows, *(_class(n, names) | fitted.get(n.effects.proposed.effect.id, {}) for n in diagnosis.named)]
+    for named in diagnosis.named:
+        row = _class(named, names)
+        if (found := fitted.get(named.effects.proposed.effect.id)) is not None:
+            row["nonlinear"], row["nonlinear_interval"] = found
+        rows.append(row)
+    return rows
 
 
-def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
+def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
     """Nonlinear parameters of the named effects as ``compare`` has them for the model with all of these, with their intervals.
 
     A search has them at its own noise and beside other terms: one value under one name needs one estimate.
@@ -69,17 +88,17 @@ def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
     model = settled(Model(problem, terms_of(catalogue.get_all(list(ids)), problem)))
     between = intervals(model)
     return {
-        term.effect.id: {"nonlinear": dict(term.values), "nonlinear_interval": between.get(term.effect.id, {})}
+        term.effect.id: (dict(term.values), dict(between.get(term.effect.id, {})))
         for term in model.terms
         if term.values and term.effect.id in {one.effect.id for one in added}
     }
 
 
-def _class(named: Named, names: Names) -> dict[str, Any]:
+def _class(named: Named, names: Names) -> EffectClassDocument:
     group = named.effects
     proposed = group.proposed
     scope = group.scope
-    row: dict[str, Any] = {
+    row: EffectClassDocument = {
         "effects": list(group.ids),
         "scope": scope,
         "rms_after_ug": MICRO * named.rms_after,
@@ -90,19 +109,17 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
         "nonlinear": {} if scope == "data" else dict(proposed.values),
         "nonlinear_of": None if scope == "data" or not proposed.values else proposed.effect.id,
         "plausible": _plausible(group.size, proposed.effect.typical_ug),
+        "influence": _dwells(named.carried, names),
+        "without_influence": without_influence(named.carried),
     }
-    row |= {"influence": _dwells(named.carried, names), "without_influence": without_influence(named.carried)}
     if named.evidence:
         units = [names.units[u] for u in named.units]
-        row |= {
-            "units": units,
-            "dwells": [names.dwells[d] for d in named.dwells],
-            "evidence": f"{' and '.join(units)}: {named.evidence}" if len(units) > 1 else named.evidence,
-        }
+        row["units"], row["dwells"] = units, [names.dwells[d] for d in named.dwells]
+        row["evidence"] = f"{' and '.join(units)}: {named.evidence}" if len(units) > 1 else named.evidence
     return row
 
 
-def _bad_dwell(diagnosis: Diagnosis, bad: BadDwell, names: Names) -> dict[str, Any]:
+def _bad_dwell(diagnosis: Diagnosis, bad: BadDwell, names: Names) -> EffectClassDocument:
     size = float(np.linalg.norm(bad.off))
     return {
         "effects": [BAD_DWELL],
@@ -121,7 +138,7 @@ def _bad_dwell(diagnosis: Diagnosis, bad: BadDwell, names: Names) -> dict[str, A
     }
 
 
-def in_part_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def in_part_of(diagnosis: Diagnosis) -> list[UnseenInPart]:
     """Effects that the plan cannot see at some values of their nonlinear parameters, one row a range."""
     return [
         {
@@ -138,7 +155,7 @@ def in_part_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def smallest_of(diagnosis: Diagnosis) -> list[SmallestNamed]:
     """Smallest detected sizes of effects, those that slow noise hides most first."""
     return [
         {"effect": s.effect, "size_ug": MICRO * s.size, "without_slow_noise_ug": MICRO * s.without_slow}
@@ -146,10 +163,10 @@ def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def evidence_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
+def evidence_of(diagnosis: Diagnosis, names: Names) -> VerdictEvidence:
     """The basis of the verdict: degrees of freedom, condition, the bias without single dwells, the smallest cubic detected."""
     evidence = diagnosis.evidence
-    largest = None
+    largest: StudentisedDwell | None = None
     if evidence.largest is not None:
         size, unit, dwell = evidence.largest
         largest = {**names.at(unit, dwell), "studentised": known(round(size, 2))}
@@ -178,7 +195,7 @@ def white_noise_of(model: Model) -> float | None:
     return known(MICRO * float(np.sqrt(np.mean(finite**2))))
 
 
-def leave_out_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
+def leave_out_of(diagnosis: Diagnosis, names: Names) -> LeaveOut | None:
     """The single dwells to leave out, and the verdict on the others; None if there are none."""
     dwells = [d for d in diagnosis.removed if not d.tail]
     if not dwells:
@@ -189,27 +206,27 @@ def leave_out_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
     }
 
 
-def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
+def influence_of(diagnosis: Diagnosis, names: Names) -> list[InfluentialDwell]:
     """Dwells by influence on the verdict, largest first; dwells left out have all of it."""
     single = [d for d in diagnosis.removed if not d.tail]
-    rows = [{**names.at(d.unit, d.dwell), "share": 1.0} for d in single]
+    rows: list[InfluentialDwell] = [{**names.at(d.unit, d.dwell), "share": 1.0} for d in single]
     if rows and not (diagnosis.named or diagnosis.handled):
         return rows
     return _dwells(diagnosis.carried, names)
 
 
-def _dwells(carried: CarriedEvidence, names: Names) -> list[dict[str, Any]]:
+def _dwells(carried: CarriedEvidence, names: Names) -> list[InfluentialDwell]:
     return [{**names.at(d.unit, d.dwell), "share": round(d.share, 4)} for d in carried.dwells]
 
 
-def without_influence(carried: CarriedEvidence) -> dict[str, Any] | None:
+def without_influence(carried: CarriedEvidence) -> WithoutInfluence | None:
     """The verdict without the dwells of largest influence; None if nothing is named."""
     if carried.log_p_without is None:
         return None
     return {"dwells": len(carried.dwells), "p_value": probability(carried.log_p_without)}
 
 
-def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
+def removed_of(diagnosis: Diagnosis, names: Names) -> RemovedDwells | None:
     """Single dwells that were left out, and whether they are tails of the noise; None if there are none."""
     if not diagnosis.removed:
         return None
@@ -227,7 +244,7 @@ def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
     }
 
 
-def noise_of(model: Model) -> dict[str, Any]:
+def noise_of(model: Model) -> NoiseFigures:
     """The estimated noise: shares of 1/f and random walk over the white variance, and the ratio between units and axes."""
     noise = model.noise
     return {
@@ -274,7 +291,7 @@ def _plausible(size: float, typical: tuple[float, float]) -> bool:
     return size <= 0.0 or 0.1 * typical[0] <= MICRO * size <= typical[1]
 
 
-def suspected_of(diagnosis: Diagnosis) -> dict[str, Any] | None:
+def suspected_of(diagnosis: Diagnosis) -> SuspectedEffects | None:
     """What a model that fails without a named cause lacks most probably; None where nothing is suspected."""
     suspected = diagnosis.suspected
     if suspected is None:

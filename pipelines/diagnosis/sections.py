@@ -11,6 +11,7 @@ from inertial.data_errors.handling import named as handling_error
 from inertial.quantities import BY_COLUMN
 from inertial.uncertainty.rounding import chance, short, short_values
 from pipelines.diagnosis import sentences
+from pipelines.diagnosis.documents import DiagnosisDocument, EffectClassDocument, NextMeasurement
 
 HIDDEN, SHOWN = 3.0, 4
 """Factor by which slow noise must raise the smallest detectable size of an effect to list it, and the number of effects
@@ -40,7 +41,7 @@ class Section:
         return [column if isinstance(column, str) else join.join(filter(None, column)) for column in self.columns]
 
 
-def faults(document: dict[str, Any]) -> Section:
+def faults(document: DiagnosisDocument) -> Section:
     """The data faults."""
     rows = [[f["fault"], ", ".join(f["units"]), _numbers(f["dwells"]), f["evidence"]] for f in document["blocked_by"]]
     title = "Data faults: correct these first; these units are left out"
@@ -53,7 +54,7 @@ def _numbers(dwells: list[int]) -> str:
     return ", ".join(map(str, dwells)) or "all"
 
 
-def drivers(document: dict[str, Any], most: int | None = DRIVERS) -> Section:
+def drivers(document: DiagnosisDocument, most: int | None = DRIVERS) -> Section:
     """The recorded quantities that the residual follows, ``most`` of them, all where None."""
     rows = [
         [p["driver"], " ".join(p["axes"]), f"{100.0 * p['share']:.0f} %", chance(p["p_value"])]
@@ -62,7 +63,7 @@ def drivers(document: dict[str, Any], most: int | None = DRIVERS) -> Section:
     return Section("Drivers of the residual", ("driver", "axes", ("share of excess", ""), ("p", "")), rows, [])
 
 
-def missing(document: dict[str, Any]) -> Section:
+def missing(document: DiagnosisDocument) -> Section:
     """The classes of missing effects, in the order of the document."""
     rows: list[list[str]] = []
     for group in document["classes"]:
@@ -78,7 +79,7 @@ def missing(document: dict[str, Any]) -> Section:
     return Section(title, columns, rows, _legend(document) if rows else [])
 
 
-def _legend(document: dict[str, Any]) -> list[str]:
+def _legend(document: DiagnosisDocument) -> list[str]:
     """The meaning of the columns and marks of the missing effects."""
     groups = document["classes"]
     legend = (
@@ -102,7 +103,7 @@ def symbol_of(name: str) -> str:
     return effects.get(name).symbol if name in effects.catalogue() or ":" in name else "a single dwell"
 
 
-def parameters_of(group: dict[str, Any]) -> str:
+def parameters_of(group: EffectClassDocument) -> str:
     """Nonlinear parameters with the effect that they belong to; a row may have several effects."""
     name = group.get("nonlinear_of") or group["effects"][0]
     if group["scope"] == "data" or not group["nonlinear"]:
@@ -121,7 +122,7 @@ def _within(interval: Sequence[float] | None) -> str:
     return f" ({short(interval[0])} to {short(interval[1])})" if interval else ""
 
 
-def next_measurement(proposed: list[dict[str, Any]]) -> Section:
+def next_measurement(proposed: Sequence[NextMeasurement]) -> Section:
     """The next measurement step by step, with station time and expected separation, and what no steps separate."""
     steps = [p for p in proposed if p.get("measurable", True)]
     rows = [
@@ -129,7 +130,7 @@ def next_measurement(proposed: list[dict[str, Any]]) -> Section:
             short(p["outer_deg"]),
             short(p["inner_deg"]),
             short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (during the ramp)"),
-            short(p.get("wait_s")) + (f" after {short(p['off_s'] / 60.0)} min off" if p.get("off_s") else ""),
+            short(p.get("wait_s")) + (f" after {short(p['off_s'] / 60.0)} min off" if "off_s" in p else ""),
             str(p.get("repeats", 1)),
             p["why"],
         ]
@@ -141,7 +142,7 @@ def next_measurement(proposed: list[dict[str, Any]]) -> Section:
     return Section("Measure next, in this order", columns, rows, notes)
 
 
-def unseen(document: dict[str, Any], *, brief: bool = False) -> Section:
+def unseen(document: DiagnosisDocument, *, brief: bool = False) -> Section:
     """The effects that the plan cannot show.
 
     Parameters
@@ -166,7 +167,7 @@ def _quantity(column: str) -> str:
     )
 
 
-def unseen_in_part(document: dict[str, Any]) -> Section:
+def unseen_in_part(document: DiagnosisDocument) -> Section:
     """The effects that the plan shows at some values of their parameters only."""
     parts: dict[str, list[str]] = {}
     for row in document.get("unseen_in_part", ()):
@@ -175,7 +176,7 @@ def unseen_in_part(document: dict[str, Any]) -> Section:
     return Section("Effects that this plan shows only in part", ("effect", "not visible for"), rows, [])
 
 
-def hidden_by_noise(document: dict[str, Any]) -> Section:
+def hidden_by_noise(document: DiagnosisDocument) -> Section:
     """The effects that 1/f noise or random walk of this size hides, with the measurement for smaller sizes."""
     named = document.get("smallest_named", ())
     raised = [row for row in named if row["size_ug"] > HIDDEN * row["without_slow_noise_ug"]][:SHOWN]
@@ -188,7 +189,7 @@ def hidden_by_noise(document: dict[str, Any]) -> Section:
     return Section("Effects hidden by slow noise (1/f, random walk)", columns, rows, [])
 
 
-def worded(document: dict[str, Any]) -> dict[str, Any]:
+def worded(document: DiagnosisDocument) -> dict[str, Any]:
     """A diagnosis as its tables and sentences by name, for a template."""
     return {
         "verdict": sentences.verdict(document),

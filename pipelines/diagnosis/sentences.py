@@ -8,6 +8,7 @@ from inertial.counts import degrees_of_freedom, number_of
 from inertial.criticism.evidence import FEW_DOF
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.uncertainty.rounding import chance, equal, short
+from pipelines.diagnosis.documents import DiagnosisDocument, EffectClassDocument, NextMeasurement
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 
 BAD_DWELL = "bad_dwell"
@@ -21,7 +22,7 @@ UNSEEN = "not seen so far: "
 UNEXPLAINED = "Significant, but of unknown cause"
 
 
-def verdict(document: dict[str, Any]) -> str:
+def verdict(document: DiagnosisDocument) -> str:
     """The verdict in one sentence with its numbers."""
     error, faulty = document["error"], {u for f in document["blocked_by"] for u in f["units"]}
     if error["rms_ug"] is None:
@@ -34,12 +35,12 @@ def verdict(document: dict[str, Any]) -> str:
     if document["adequate"] is not False:
         return f"{told}."
     spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
-    single = document.get("leave_out") or {}
+    single = document["leave_out"]
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
         rest = f"; also missing: {', and '.join(named)}" if named else ""
-        passes = not named and not document["unexplained"] and error["p_value"] >= ADEQUATE_ABOVE
-        unknown = "adequate_without" in single and single["adequate_without"] is None
+        passes = not named and not document["unexplained"] and (error["p_value"] or 0.0) >= ADEQUATE_ABOVE
+        unknown = single is not None and single["adequate_without"] is None
         found = "is adequate" if passes else "is not adequate either"
         without = f"the model {'cannot be judged' if passes and unknown else found}: {figures}"
         return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
@@ -78,14 +79,14 @@ def _figures(judged: Mapping[str, Any]) -> str:
     return f"{left}; noise of the measurement {short(judged['floor_ug'])} µg rms (p {equal(judged['p_value'])})"
 
 
-def class_text(group: dict[str, Any]) -> str:
+def class_text(group: EffectClassDocument) -> str:
     """A handling error with its unit and first dwell, and the effects that explain the data equally well."""
     units, dwells = group.get("units") or [], group.get("dwells") or []
     where = f"{', '.join(units) or 'all units'}{f', dwell {dwells[0]}' if dwells else ''}"
     return f"{' or '.join(group['effects'])} ({where})"
 
 
-def cards(document: dict[str, Any]) -> list[tuple[str, str]]:
+def cards(document: DiagnosisDocument) -> list[tuple[str, str]]:
     """The figures of a verdict, each with its meaning; none where every unit has a data fault."""
     error, classes = document["error"], document["classes"]
     if error["rms_ug"] is None:
@@ -99,7 +100,7 @@ def cards(document: dict[str, Any]) -> list[tuple[str, str]]:
     return [*figures, (chance(error["p_value"]), "probability of the residual under noise alone")]
 
 
-def evidence_text(document: dict[str, Any]) -> str:
+def evidence_text(document: DiagnosisDocument) -> str:
     """The basis of the verdict in one line; empty without a verdict."""
     evidence = document.get("evidence")
     if not evidence:
@@ -116,13 +117,13 @@ def evidence_text(document: dict[str, Any]) -> str:
     return "; ".join(parts)
 
 
-def few_dwells(document: dict[str, Any]) -> bool:
+def few_dwells(document: DiagnosisDocument) -> bool:
     """Whether an adequate model was judged by so few dwells that the smallest detected effect has to be told."""
     evidence = document.get("evidence")
     return bool(document["adequate"] and evidence and evidence["degrees_of_freedom"] < FEW_DOF)
 
 
-def undetected(document: dict[str, Any]) -> str:
+def undetected(document: DiagnosisDocument) -> str:
     """The smallest cubic term that the dwells show; empty without a verdict."""
     evidence = document.get("evidence")
     if not evidence:
@@ -136,7 +137,7 @@ def undetected(document: dict[str, Any]) -> str:
     return f"{few}a cubic term is detected from {short(smallest)} µg/g³ on, with a probability of one half"
 
 
-def influences(document: dict[str, Any], most: int | None = NAMED_DWELLS) -> list[str]:
+def influences(document: DiagnosisDocument, most: int | None = NAMED_DWELLS) -> list[str]:
     """The dwells with the largest influence on each class, or on the verdict where nothing is named; none for an adequate model.
 
     Parameters
@@ -154,7 +155,7 @@ def influences(document: dict[str, Any], most: int | None = NAMED_DWELLS) -> lis
     ]
 
 
-def _carried(what: str, carried: dict[str, Any], most: int | None) -> str:
+def _carried(what: str, carried: EffectClassDocument | DiagnosisDocument, most: int | None) -> str:
     """Dwells with their shares, and the probability without them."""
     rows = carried["influence"][:most]
     dwells = (
@@ -166,7 +167,7 @@ def _carried(what: str, carried: dict[str, Any], most: int | None) -> str:
     )
 
 
-def without_single_dwells(document: dict[str, Any]) -> str:
+def without_single_dwells(document: DiagnosisDocument) -> str:
     """The verdict without single dwells that have a fault, and the option that leaves them out; empty where there are none."""
     single = document.get("leave_out")
     if not single:
@@ -177,7 +178,7 @@ def without_single_dwells(document: dict[str, Any]) -> str:
     return f"without {these} the model is: {found}; to leave out: --leave-out {names}"
 
 
-def tails_left_out(document: dict[str, Any]) -> str:
+def tails_left_out(document: DiagnosisDocument) -> str:
     """The dwells that were left out and that the tails of the noise may explain; empty where there are none."""
     removed = document.get("removed")
     if not removed or not removed["heavy_tails"]:
@@ -191,7 +192,7 @@ def tails_left_out(document: dict[str, Any]) -> str:
     )
 
 
-def left_out(document: dict[str, Any]) -> list[str]:
+def left_out(document: DiagnosisDocument) -> list[str]:
     """What was left out of the judgement, and what the verdict is without it."""
     removed = document.get("removed")
     count = len(removed["dwells"]) if removed and not removed["heavy_tails"] else 0
@@ -200,7 +201,7 @@ def left_out(document: dict[str, Any]) -> list[str]:
     return [text for text in (without_single_dwells(document), tails_left_out(document), counted) if text]
 
 
-def why_recommended(document: dict[str, Any]) -> list[str]:
+def why_recommended(document: DiagnosisDocument) -> list[str]:
     """Why effects that are named are not recommended for the model, or are by their evidence alone."""
     lines: list[str] = []
     for group in document["classes"]:
@@ -224,7 +225,7 @@ def why_recommended(document: dict[str, Any]) -> list[str]:
     return lines
 
 
-def not_listed(document: dict[str, Any]) -> str:
+def not_listed(document: DiagnosisDocument) -> str:
     """How many effects this plan cannot show, or only in part; empty where it shows all."""
     part = len({row["effect"] for row in document.get("unseen_in_part", ())})
     counts = (("cannot show {}", len(document["unseen"])), ("shows {} only in part", part))
@@ -232,7 +233,7 @@ def not_listed(document: dict[str, Any]) -> str:
     return f"This plan {' and '.join(told)}" if told else ""
 
 
-def unexplained_text(document: dict[str, Any]) -> str:
+def unexplained_text(document: DiagnosisDocument) -> str:
     """What the residual follows without an effect of the catalogue that explains it; empty where there is nothing."""
     unexplained = document["unexplained"]
     if not unexplained:
@@ -242,7 +243,7 @@ def unexplained_text(document: dict[str, Any]) -> str:
     return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])}).{of_table}"
 
 
-def suspected_text(document: dict[str, Any]) -> str:
+def suspected_text(document: DiagnosisDocument) -> str:
     """What the model lacks most probably where nothing is named, and what decides it; empty where nothing is suspected."""
     suspected = document.get("suspected")
     if not suspected:
@@ -260,7 +261,7 @@ def not_recorded(reason: str) -> str:
     return "" if match is None else match[1]
 
 
-def _without_angles(document: dict[str, Any]) -> str:
+def _without_angles(document: DiagnosisDocument) -> str:
     """What could not be tried because the angles of the table are not recorded, as a sentence to add; empty where they are."""
     reasons = document.get("reasons", {})
     names = [name for name in document["unseen"] if not_recorded(reasons.get(name, "")) == "outer_deg"]
@@ -269,7 +270,7 @@ def _without_angles(document: dict[str, Any]) -> str:
     return f" Without the table's angles {', '.join(names)} could not be tried: record outer_deg and inner_deg."
 
 
-def why_first(document: dict[str, Any]) -> list[str]:
+def why_first(document: DiagnosisDocument) -> list[str]:
     """Why one effect of a class is proposed and not another one; empty where no class has several."""
     lines: list[str] = []
     for group in document["classes"]:
@@ -283,7 +284,7 @@ def why_first(document: dict[str, Any]) -> list[str]:
     return lines
 
 
-def cost_to_decide(document: dict[str, Any]) -> list[str]:
+def cost_to_decide(document: DiagnosisDocument) -> list[str]:
     """What the next measurement costs and brings, one line for each purpose; or what would separate a class in place of it."""
     lines: list[str] = []
     rows = document["next_measurements"]
@@ -301,14 +302,12 @@ def cost_to_decide(document: dict[str, Any]) -> list[str]:
     return lines
 
 
-def brings(row: dict[str, Any]) -> str:
+def brings(row: NextMeasurement) -> str:
     """Station time and expected separation of the steps of a row of the next measurement."""
-    text = f"{row['why']}: {short(row['minutes'])} min of station time; "
-    expected = row.get("separation_if")
-    if not expected:
-        return text + (
-            f"χ² of a coefficient of typical size: {row['separation_before']:.1f} now, {row['separation_after']:.0f} expected"
-        )
-    after = ", ".join(f"{chi:.0f} if {name} is true" for name, chi in expected.items())
-    text += f"difference of their χ²: {row['separation_before']:.1f} now, expected {after}"
-    return text + (f"; not separated from the first: {', '.join(row['not_parted'])}" if row.get("not_parted") else "")
+    text = f"{row['why']}: {short(row.get('minutes'))} min of station time; "
+    before, after = row.get("separation_before", 0.0), row.get("separation_after", 0.0)
+    if not (expected := row.get("separation_if")):
+        return f"{text}χ² of a coefficient of typical size: {before:.1f} now, {after:.0f} expected"
+    by_truth = ", ".join(f"{chi:.0f} if {name} is true" for name, chi in expected.items())
+    parted = f"; not separated from the first: {', '.join(row['not_parted'])}" if "not_parted" in row else ""
+    return f"{text}difference of their χ²: {before:.1f} now, expected {by_truth}{parted}"

@@ -1,13 +1,12 @@
 """The suggestion if a driver explains the excess and no effect of the catalogue does: a formula for a model file."""
 
-from typing import Any
-
 import numpy as np
 
 from inertial.criticism.diagnosis import Unexplained
 from inertial.expressions import NAMES, QUANTITIES
 from inertial.quantities import formula_name
 from inertial.state import State
+from pipelines.diagnosis.documents import SuggestedFormula
 
 _PARTS = {
     "bias": "the error",
@@ -24,7 +23,7 @@ def what_follows(unexplained: Unexplained) -> str:
     return f"{_PARTS[unexplained.part]} {verb} {unexplained.driver}{swing}"
 
 
-def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
+def offer(unexplained: Unexplained, state: State) -> SuggestedFormula | None:
     """A formula that follows the driver: a line, a swing, or a cubic about the middle of its range; None if it is no single one.
 
     Of the scale factor and the axes it is times the forces along and across the axis; of the transfer curve the quantity is times
@@ -51,17 +50,10 @@ def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
         columns = [f"{across}*{_factor(c)}" for across in ("fj", "fk") for c in columns]
     elif part == "transfer":
         columns = [f"{_scaled(name, values)}*f**{power}" for power in (2, 3)]
-    return {
-        "id": f"{name.lower()}_{part}",
-        "columns": columns,
-        "why": f"{what_follows(unexplained)}; the cause is not known yet",
-    }
-
-
-def as_toml(formula: dict[str, Any]) -> str:
-    """The formula as text of a model file."""
-    columns = ", ".join(f'"{c}"' for c in formula["columns"])
-    return f'[[formula]]\nid = "{formula["id"]}"\ncolumns = [{columns}]\nwhy = "{formula["why"]}"'
+    formula, why = f"{name.lower()}_{part}", f"{what_follows(unexplained)}; the cause is not known yet"
+    listed = ", ".join(f'"{column}"' for column in columns)
+    text = f'[[formula]]\nid = "{formula}"\ncolumns = [{listed}]\nwhy = "{why}"'
+    return {"id": formula, "columns": columns, "why": why, "toml": text}
 
 
 def _values(name: str, state: State) -> np.ndarray | None:

@@ -15,6 +15,7 @@ from pipelines.chain.runner import Done, Runner
 from pipelines.flows.calibrate import requested, stage, with_last
 from pipelines.flows.local import flow_run
 from pipelines.flows.operator import Paused
+from pipelines.inquiry.documents import InquiryDocument
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
 from pipelines.inquiry.lineage import JointDiagnosis
 from pipelines.inquiry.loop import Consent, InquirySettings, Participants, run_inquiry
@@ -52,7 +53,7 @@ def investigate(  # noqa: PLR0913 - the parameters of a flow are the form on the
     budget_min: float | None = None,
     unseen: bool = False,
     ask: bool = False,
-) -> dict[str, Any]:
+) -> InquiryDocument:
     """Measure a lot, then only what separates the possible missing effects; return the document of the inquiry.
 
     Without ``repeat`` every flow run measures the lot again, and a retry of the same flow run continues it. With ``ask``
@@ -72,7 +73,7 @@ def investigate(  # noqa: PLR0913 - the parameters of a flow are the form on the
 
 def investigate_locally(
     request: Request, archive: Archive, settings: InquirySettings, participants: Participants, *, ask: bool
-) -> dict[str, Any]:
+) -> InquiryDocument:
     """Run the flow on the server of PREFECT_API_URL or on a temporary one; return the document of the inquiry."""
     archive.prepare()
     job = request.job(archive)

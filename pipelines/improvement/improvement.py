@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipelines.diagnosis.documents import DiagnosisDocument
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ class Improvement:
         name, again, temperatures = found
         return ImprovedTables(self.tables.dwells, self.tables.history, again, temperatures), name
 
-    def _diagnosis(self, effects: list[str] | None, *, first: bool) -> dict[str, Any]:
+    def _diagnosis(self, effects: list[str] | None, *, first: bool) -> DiagnosisDocument:
         """The diagnosis of a model, as the attendant sees it."""
         with self.attendant.working("looking for missing effects"):
             from pipelines.diagnosis.diagnose import examination  # loads the search for effects: after the first line
@@ -146,7 +147,7 @@ class Improvement:
         self.attendant.diagnosed(made, first=first)
         return made.document
 
-    def _choices(self, diagnosis: dict[str, Any], named: list[str], *, yes: bool) -> list[dict[str, Any]]:
+    def _choices(self, diagnosis: DiagnosisDocument, named: list[str], *, yes: bool) -> list[dict[str, Any]]:
         """For each class with a recommended effect: the effect, those that these data do not separate from it, and the answer.
 
         Raises

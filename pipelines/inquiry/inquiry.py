@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 from threadpoolctl import threadpool_limits
 
@@ -11,8 +11,10 @@ from inertial.next_measurement.proposals import Proposal
 from inertial.planning.sequences import SequenceStep
 from pipelines.archive import Archive, Run, code_hash, files, stage_key
 from pipelines.chain.runner import Runner, from_station
-from pipelines.diagnosis.diagnose import document, examined, report_fields
+from pipelines.diagnosis.diagnose import document, examined
+from pipelines.diagnosis.documents import DiagnosisDocument, NextMeasurement
 from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
+from pipelines.inquiry.documents import InquiryDocument, InquiryRound
 from pipelines.inquiry.explanation import shows, why
 from pipelines.inquiry.followup import circumstances, follow_up
 from pipelines.inquiry.lineage import JointDiagnosis, RunSequence
@@ -53,7 +55,7 @@ def ending_of(joint: JointDiagnosis) -> Ending | None:
     return Ending("told_apart", _all_identified(document))
 
 
-def _all_identified(document: dict[str, Any]) -> str:
+def _all_identified(document: DiagnosisDocument) -> str:
     """Every class has one effect; those that no dwells left out can judge are told."""
     groups = document["classes"]
     text = f"every class contains one effect: {', '.join(g['effects'][0] for g in groups)}"
@@ -97,7 +99,7 @@ class FollowUp:
     """
 
     job: Job
-    rows: tuple[dict[str, Any], ...]
+    rows: tuple[NextMeasurement, ...]
     why: tuple[str, ...]
     minutes: float
     begun: bool = False
@@ -117,7 +119,7 @@ class Inquiry:
     effects: tuple[str, ...]
     budget: float
     unseen: bool = False
-    rounds: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    rounds: list[InquiryRound] = field(default_factory=list[InquiryRound])
 
     @property
     def base(self) -> Job:
@@ -136,9 +138,8 @@ class Inquiry:
         with threadpool_limits(1):
             measured, faults, diagnosis = examined(dwells, history, self.effects)
             following = Proposed() if diagnosis is None else proposed(diagnosis, around)
-            content = document(measured, faults, diagnosis, following)
-        fields = report_fields(measured.units, list(self.effects), diagnosis)
-        content |= {"reasons": {}, **fields, "offer": None}
+            content = document(measured, faults, diagnosis, self.effects, following)
+        content["offer"] = None
         return JointDiagnosis(self.lineage, content, measured, diagnosis, following)
 
     def next_step(self, joint: JointDiagnosis) -> FollowUp | Ending:
@@ -243,7 +244,7 @@ class Inquiry:
         html = render_diagnosis(made, " + ".join(self.lineage.ids))
         run.save_report(key, html, {"inputs": inputs, "parameters": parameters, "code": code})
 
-    def document(self, joint: JointDiagnosis, ending: Ending) -> dict[str, Any]:
+    def document(self, joint: JointDiagnosis, ending: Ending) -> InquiryDocument:
         """The whole inquiry as one document."""
         minutes = self.lineage.minutes()
         return {

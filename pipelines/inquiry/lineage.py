@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import pandas as pd
 
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.state import State
 from pipelines.archive import Run
+from pipelines.diagnosis.documents import DiagnosisDocument
 from pipelines.diagnosis.next_measurement import Proposed
 from pipelines.tables.dwells import Measured
 from schemas.errors import DataRejected
@@ -63,7 +63,7 @@ class JointDiagnosis:
     """The diagnosis of all runs of a lineage together."""
 
     lineage: RunSequence
-    document: dict[str, Any]
+    document: DiagnosisDocument
     measured: Measured
     diagnosis: Diagnosis | None
     following: Proposed

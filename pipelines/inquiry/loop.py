@@ -5,11 +5,12 @@ The stages run as plain calls or as tasks of the orchestrator; approval of extra
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
+from pipelines.inquiry.documents import InquiryDocument
 from pipelines.inquiry.inquiry import FOLLOW_UP, Ending, FollowUp, Inquiry, begin
 from pipelines.inquiry.lineage import JointDiagnosis
 from pipelines.jobs.job import Job
@@ -57,7 +58,7 @@ class Participants:
     diagnosed: Callable[[JointDiagnosis], None] = lambda _joint: None
 
 
-def run_inquiry(job: Job, archive: Archive, settings: InquirySettings, participants: Participants) -> dict[str, Any]:
+def run_inquiry(job: Job, archive: Archive, settings: InquirySettings, participants: Participants) -> InquiryDocument:
     """The document of an inquiry, run until it ends.
 
     An inquiry that was interrupted continues: completed stages are not repeated, and a follow-up that was started is completed

@@ -8,6 +8,7 @@ from inertial import effects
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.data_errors.handling import named as handled
 from pipelines.diagnosis.diagnose import Examination
+from pipelines.diagnosis.documents import DiagnosisDocument, EffectClassDocument
 from pipelines.diagnosis.sections import worded
 from pipelines.report.diagnosis_pictures import driver_chart, noise_chart, pose_chart
 from pipelines.report.effect_view import effect_chart, effect_views
@@ -45,7 +46,7 @@ def render_diagnosis(made: Examination, source: str, coefficients: list[dict[str
     return interactive(page)
 
 
-def _members(group: dict[str, Any], document: dict[str, Any]) -> list[dict[str, Any]]:
+def _members(group: EffectClassDocument, document: DiagnosisDocument) -> list[dict[str, Any]]:
     """The effects of a class, or its handling errors, each with symbol and equation, and which one is recommended."""
     simplest = next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
     members: list[dict[str, Any]] = []

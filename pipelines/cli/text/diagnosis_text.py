@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -11,6 +12,7 @@ from pipelines.cli.next_commands import FindData, print_next_of_diagnosis
 from pipelines.cli.printing import console, print_table, say, warn
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
+from pipelines.diagnosis.documents import DiagnosisDocument, NextMeasurement
 from pipelines.diagnosis.sections import Section
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def print_diagnosis(
-    document: dict[str, Any],
+    document: DiagnosisDocument,
     *,
     made: Examination | None = None,
     data: FindData | None,
@@ -62,7 +64,7 @@ def _picture(made: Examination | None) -> None:
         print_view(effect_views(made.diagnosis, made.sound)[0])
 
 
-def print_findings(document: dict[str, Any], *, brief: bool = False) -> None:
+def print_findings(document: DiagnosisDocument, *, brief: bool = False) -> None:
     """Print the drivers that the residual follows, the classes of missing effects, and the dwells that decide.
 
     brief : the classes alone, and why the first effect of each is proposed
@@ -81,7 +83,7 @@ def print_findings(document: dict[str, Any], *, brief: bool = False) -> None:
     warn(document.get("warnings", ()))
 
 
-def print_next_measurement(proposed: list[dict[str, Any]], out: Console | None = None) -> None:
+def print_next_measurement(proposed: Sequence[NextMeasurement], out: Console | None = None) -> None:
     """Print the next measurement step by step, on standard output where ``out`` is None."""
     print_section(sections.next_measurement(proposed), out)
 
@@ -100,7 +102,7 @@ def _dim(text: str) -> None:
         say(text, style="dim")
 
 
-def _unexplained(document: dict[str, Any], model: Path | None) -> None:
+def _unexplained(document: DiagnosisDocument, model: Path | None) -> None:
     if not document["unexplained"]:
         return
     say(f"{sentences.UNEXPLAINED}: {sentences.unexplained_text(document)}")

@@ -8,6 +8,7 @@ from pipelines.archive import Run
 from pipelines.cli.printing import error_console, say
 
 if TYPE_CHECKING:
+    from pipelines.diagnosis.documents import DiagnosisDocument
     from pipelines.jobs.references import ReferencesDocument
     from pipelines.stages.judge import AdequacyDocument
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}  # style of a verdict; None: it cannot be judged
 
 
-def print_verdict(document: dict[str, Any]) -> None:
+def print_verdict(document: DiagnosisDocument) -> None:
     """Print the verdict of a diagnosis."""
     from pipelines.diagnosis.sentences import verdict
 

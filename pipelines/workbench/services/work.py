@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.audit.finding import AuditFinding
+from pipelines.diagnosis.documents import DiagnosisDocument
 from pipelines.drawing import Chart
 from pipelines.report.effect_view import EffectView
 from pipelines.report.residual_table import ResidualTable
@@ -32,7 +33,7 @@ class Diagnosed:
     names : quantities for formulas, with their meaning
     """
 
-    document: dict[str, Any]
+    document: DiagnosisDocument
     table: ResidualTable | None
     ladder: list[dict[str, Any]]
     before: NDArray[np.float64] | None
