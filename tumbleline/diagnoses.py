@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -15,6 +15,8 @@ from tumbleline.recordings import Recording, Source, read
 
 if TYPE_CHECKING:
     from pipelines.diagnosis.diagnose import Examination
+    from pipelines.diagnosis.documents import DiagnosisDocument
+    from pipelines.improvement.documents import ImproveDocument
 
 _FIGURES = ("size_ug", "p_value", "rms_after_ug", "heldout_after_ug")
 
@@ -26,7 +28,7 @@ class JudgedModel:
     document : with the keys of ``--json`` of the command of the same name
     """
 
-    document: dict[str, Any] = field(repr=False)
+    document: DiagnosisDocument | ImproveDocument = field(repr=False)
 
     @property
     def adequate(self) -> bool | None:
@@ -43,6 +45,7 @@ class JudgedModel:
 class ModelDiagnosis(JudgedModel):
     """The diagnosis of a model."""
 
+    document: DiagnosisDocument = field(repr=False)
     source: str = ""
     _made: Examination | None = field(default=None, repr=False)
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.improvement.documents import ImproveDocument
 from pipelines.improvement.improvement import Attendant, ImprovedTables, Improvement
 from tumbleline.calibrations import Calibration, fit
 from tumbleline.diagnoses import JudgedModel, ModelDiagnosis
@@ -24,6 +25,7 @@ class ImprovedModel(JudgedModel):
     calibration : the fit of the resulting model
     """
 
+    document: ImproveDocument = field(repr=False)
     calibration: Calibration = field(repr=False)
 
     @property

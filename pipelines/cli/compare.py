@@ -1,9 +1,8 @@
 """``tumbleline compare``: a model against the dwells it is fitted to, dwells left out, and a fresh run."""
 
-from typing import Any
-
 from pipelines.cli import options
 from pipelines.cli.printing import error_console, give, print_table, say, short, short_values, warn
+from pipelines.diagnosis.documents import ComparisonDocument, StationParameter
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 240
@@ -47,7 +46,7 @@ def command(
     give(document, print_comparison, as_json=as_json)
 
 
-def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
+def print_comparison(document: ComparisonDocument, poses: int = POSES) -> None:
     """Print a comparison for people, with so many of the worst poses."""
     say(f"model  {', '.join(document['effects'])}")
     lines = [
@@ -78,7 +77,7 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
     warn(document["warnings"])
 
 
-def _parameters(document: dict[str, Any]) -> None:
+def _parameters(document: ComparisonDocument) -> None:
     """Nonlinear parameters and those of the station."""
     from inertial import effects
 
@@ -96,12 +95,12 @@ def _parameters(document: dict[str, Any]) -> None:
         print_table(["effect", "parameter", "value", "68 % interval", "unit"], lines)
 
 
-def _interval(document: dict[str, Any], effect: str, parameter: str) -> str:
+def _interval(document: ComparisonDocument, effect: str, parameter: str) -> str:
     """The interval of a nonlinear parameter; values that differ between the axes, or are chosen from a few, have none."""
     interval = document["nonlinear_interval"].get(effect, {}).get(parameter)
     return f"{short(interval[0])} to {short(interval[1])}" if interval else "not estimated"
 
 
-def _around(row: dict[str, Any]) -> str:
+def _around(row: StationParameter) -> str:
     low, high = (1e6 * (row["value"] + sign * row["standard_error"]) for sign in (-1.0, 1.0))
     return f"{short(low)} to {short(high)}"

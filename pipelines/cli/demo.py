@@ -20,7 +20,7 @@ from schemas.progress import Progress
 if TYPE_CHECKING:
     from pipelines.demo.measure import DemoLot
     from pipelines.demo.scenes import Scene
-    from pipelines.diagnosis.documents import DiagnosisDocument
+    from pipelines.diagnosis.documents import ComparisonDocument, DiagnosisDocument
 
 PART = "Start here"
 ORDER = 50
@@ -214,7 +214,7 @@ class _Game:
             print_ending(document)
         return document
 
-    def _compare(self, title: str, *, first: bool) -> dict[str, Any]:
+    def _compare(self, title: str, *, first: bool) -> ComparisonDocument:
         from pipelines.cli.compare import print_comparison
         from pipelines.diagnosis.compare import compare
 
@@ -270,7 +270,7 @@ class _Game:
                 say(f"  {line}", style="dim")
 
 
-def _errors(document: dict[str, Any]) -> dict[str, Any]:
+def _errors(document: ComparisonDocument) -> dict[str, float | None]:
     return {name: document[name] for name in ("rms_ug", "heldout_rms_ug", "fresh_rms_ug", "floor_ug")}
 
 

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pipelines.cli import options
 from pipelines.cli.next_commands import Given, command_line, print_next
 from pipelines.cli.options import argument, option
 from pipelines.cli.printing import error_console, give, print_table, publish, say, short, warn
+from pipelines.diagnosis.documents import VersionDocument
 from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
@@ -38,7 +39,7 @@ def command(
     Without --dwells only the changes are shown.
     """
     from pipelines.cli.inputs import add_effects, both_runs, without_dwells
-    from pipelines.diagnosis.confirmation import FIGURES, JUDGED, change_row
+    from pipelines.diagnosis.confirmation import change_row
     from pipelines.improvement.improvement import ImprovedTables, errors_by_version
     from pipelines.jobs.model_files import read_model, versions
 
@@ -55,10 +56,7 @@ def command(
         tables = ImprovedTables(without_dwells(first, leave_out)[0], *others)
         rows = errors_by_version(versions(model_file), tables, lambda: error_console().status("fitting"))
     else:
-        rows = [
-            {**change_row(version), **dict.fromkeys([*FIGURES, *JUDGED]), "text": "", "warnings": []}
-            for version in versions(model_file)
-        ]
+        rows = [change_row(version) for version in versions(model_file)]
     if picture is not None:
         from pipelines.drawing.picture import picture as drawn
         from pipelines.report.diagnosis_pictures import evolution_chart
@@ -73,7 +71,7 @@ def command(
     )
 
 
-def _print(rows: list[dict[str, Any]], name: str, removes: Callable[[str], str]) -> None:
+def _print(rows: list[VersionDocument], name: str, removes: Callable[[str], str]) -> None:
     changes = [
         [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
     ]
@@ -81,15 +79,19 @@ def _print(rows: list[dict[str, Any]], name: str, removes: Callable[[str], str])
     if rows[0]["fitted_ug"] is None:
         return
     fresh = rows[0]["fresh_ug"] is not None
-    keys = ["fitted_ug", "heldout_ug", *(["fresh_ug"] if fresh else []), "floor_ug"]
-    heads = {
-        "fitted_ug": "fitted\nµg",
-        "heldout_ug": "cross-validated\nµg",
-        "fresh_ug": "fresh run\nµg",
-        "floor_ug": "assumed noise\nµg",
-    }
-    errors = [[str(row["version"]), *(short(row[key]) for key in keys)] for row in rows]
-    print_table(["version", *(heads[k] for k in keys)], errors, title="Error, rms")
+    again = ["fresh run\nµg"] if fresh else []
+    errors = [
+        [
+            str(row["version"]),
+            short(row["fitted_ug"]),
+            short(row["heldout_ug"]),
+            *([short(row["fresh_ug"])] if fresh else []),
+            short(row["floor_ug"]),
+        ]
+        for row in rows
+    ]
+    heads = ["version", "fitted\nµg", "cross-validated\nµg", *again, "assumed noise\nµg"]
+    print_table(heads, errors, title="Error, rms")
     for row in rows:
         if row["text"]:
             say(f"version {row['version']}: {row['text']}")
@@ -114,6 +116,6 @@ def removal(file: Path, effect_files: Sequence[Path], effect: str) -> str:
     return command_line("extend", str(file), "--remove", effect, *words)
 
 
-def _change(row: dict[str, Any]) -> str:
+def _change(row: VersionDocument) -> str:
     parts = [f"+ {name}" for name in row["added"]] + [f"− {name}" for name in row["removed"]]
     return "\n".join(parts) or f"{len(row['effects'])} effects"

@@ -124,7 +124,7 @@ def command(
     document["next"] = next_lines(document, (model, target), partial(judged_data, data, beside, given), given, kept)
     if recording is not None:
         document["recording"] = recording
-        document["next"] = next_of_recording(document, given, ["--model", str(model)] if model else [], kept)
+        document["next"] = next_of_recording(document, recording, given, ["--model", str(model)] if model else [], kept)
     show = print_recording if brief else print_improvement
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 

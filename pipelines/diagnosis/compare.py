@@ -1,7 +1,6 @@
 """Comparison of a model with measurements: the error on the run it is fitted to, on poses left out, and on a fresh run."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,6 +23,7 @@ from inertial.estimation.refinement import intervals, settled, terms_of
 from inertial.estimation.term import Term
 from inertial.planning.reasons import drivers_of
 from pipelines.diagnosis.confirmation import progress
+from pipelines.diagnosis.documents import ComparisonDocument, PoseComparison, StationParameter
 from pipelines.diagnosis.result_rows import BAD_DWELL
 from pipelines.tables.dwells import Measured, lot_of, measured
 from pipelines.tables.sound_lot import generator
@@ -38,7 +38,7 @@ def compare(
     fresh: pd.DataFrame | None = None,
     fresh_history: pd.DataFrame | None = None,
     before: Sequence[str] | None = None,
-) -> dict[str, Any]:
+) -> ComparisonDocument:
     """How well a model fits a lot, and a fresh run of the same units with the coefficients unchanged.
 
     Parameters
@@ -62,7 +62,7 @@ def compare(
 
 def _compared(
     measurement: Measured, effects: Sequence[str], fresh: Measured | None, before: Sequence[str] | None
-) -> dict[str, Any]:
+) -> ComparisonDocument:
     square = "misalignment" not in effects
     problem = Problem(lot_of(measurement, square=square))
     model = Model(problem, terms_of(catalogue.get_all(effects), problem))
@@ -72,7 +72,7 @@ def _compared(
     left = fitted_residuals(model)
     out = left_out(model)
     series = ("norm",) if problem.lot.radial else tuple(AXES[axis] for axis in problem.axes)  # the blocks of one unit
-    answer: dict[str, Any] = {
+    answer: ComparisonDocument = {
         "effects": [t.effect.id for t in model.terms],
         "rms_ug": MICRO * rms(left),
         "floor_ug": MICRO * model.floor(),
@@ -102,11 +102,12 @@ def _compared(
     if before is not None:
         lesser = Model(problem, terms_of(catalogue.get_all(list(before)), problem))
         lot = None if again is None else lot_of(again, like=measurement, square=square)
-        answer["progress"] = progress(
+        judged_by = progress(
             lesser, model, out, lot, lambda: doubt_of_run(measurement, problem.lot, list(before), list(effects))
         )
         if again is not None and _remember(again, [t for t in model.terms if t.effect.id not in set(before)]):
-            answer["progress"] |= {"confirmed": None, "reason": "its prediction needs the history of the fresh run"}
+            judged_by["confirmed"], judged_by["reason"] = None, "its prediction needs the history of the fresh run"
+        answer["progress"] = judged_by
     if again is not None:
         answer["warnings"] += [
             f"{name} depends on the temperature between the dwells, and no history of the fresh run was given: its prediction "
@@ -133,7 +134,7 @@ def _remember(measurement: Measured, terms: Sequence[Term]) -> list[str]:
     return [e.id for e in own if e.memory and "temperature" in drivers_of(measurement.state, e)]
 
 
-def _station(fitted: Estimate) -> list[dict[str, Any]]:
+def _station(fitted: Estimate) -> list[StationParameter]:
     """Parameters of the station with their standard errors."""
     names = [(t.effect.id, n) for t in fitted.terms if isinstance(t.effect, StationEffect) for n in t.effect.names()]
     return [
@@ -155,14 +156,14 @@ def _same_units(first: Measured, again: Measured) -> Measured:
     return again.pick([again.units.index(u) for u in first.units])
 
 
-def _by_pose(measurement: Measured, left: Array) -> list[dict[str, Any]]:
+def _by_pose(measurement: Measured, left: Array) -> list[PoseComparison]:
     """RMS residual of each pose over all units and axes, worst first."""
     if measurement.reference == "norm":
         return []
     force = np.round(measurement.state.force[0], 2) + 0.0
     poses, place = np.unique(force, axis=0, return_inverse=True)
     place = place.reshape(-1)
-    rows = [
+    rows: list[PoseComparison] = [
         {"force": poses[k].tolist(), "dwells": int(np.sum(place == k)), "rms_ug": MICRO * rms(left[:, place == k])}
         for k in range(len(poses))
     ]

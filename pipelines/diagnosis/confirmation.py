@@ -1,7 +1,6 @@
 """Test of the effects added to a model, by a fresh run or else by dwells left out; the error of all its versions."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from inertial.estimation.comparison import estimate, residuals_of, rms
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.uncertainty.rounding import short
+from pipelines.diagnosis.documents import ComparisonDocument, Confirmation, VersionDocument
 from pipelines.diagnosis.result_rows import known
 from pipelines.jobs.model_files import Version
 from schemas.units import MICRO
@@ -23,7 +23,7 @@ _TOLD = {"blocks of time": "stretches of time"}
 
 def progress(
     before: Model, after: Model, out: LeftOut, fresh: Lot | None, doubt: Callable[[], str | None] = lambda: None
-) -> dict[str, Any]:
+) -> Confirmation:
     """The evidence on the effects by which two models differ.
 
     Parameters
@@ -43,7 +43,7 @@ def progress(
     return _by_left_out(left_out(before, also=after.terms), out, doubt)
 
 
-def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str, Any]:
+def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> Confirmation:
     old, new = estimate(before), estimate(after)
     change = reproduced_change(fresh, old, new)
     problem = Problem(fresh)
@@ -73,7 +73,7 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
     }
 
 
-def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None] = lambda: None) -> dict[str, Any]:
+def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None] = lambda: None) -> Confirmation:
     kinds: list[Kind] = [kind for kind in before.density if kind in after.density]
     gains: dict[Kind, float] = {kind: after.density[kind] - before.density[kind] for kind in kinds}
     gain = gains.get("blocks of time")
@@ -171,44 +171,37 @@ def _decrease(before: Array, after: Array) -> float:
     return float(np.sqrt(np.nanmean(before**2)) - np.sqrt(np.nanmean(after**2)))
 
 
-FIGURES = {
-    "fitted_ug": "rms_ug",
-    "heldout_ug": "heldout_rms_ug",
-    "fresh_ug": "fresh_rms_ug",
-    "floor_ug": "floor_ug",
-}
-"""Figures of a version, with their keys in a comparison."""
-
-JUDGED = ("fall_ug", "fall_u_ug", "confirmed", "reason")
-
-
-Compare = Callable[[list[str], list[str] | None], dict[str, Any]]
+Compare = Callable[[list[str], list[str] | None], ComparisonDocument]
 """Errors of a model as :func:`pipelines.diagnosis.compare.compare` states them; the effects added to the second are judged."""
 
 
-def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, Any]]:
+def evolution(versions: Sequence[Version], compare: Compare) -> list[VersionDocument]:
     """One row per version: the change, its errors, and the verdict on the change as text.
 
     Parameters
     ----------
     versions : oldest first
     """
-    rows: list[dict[str, Any]] = []
+    rows: list[VersionDocument] = []
     before: list[str] | None = None
     for version in versions:
-        effects = list(version.effects)
+        row, effects = change_row(version), list(version.effects)
         errors = compare(effects, before if version.added else None)
-        progress = errors.get("progress")
-        row = {**change_row(version), **{name: errors[key] for name, key in FIGURES.items()}}
-        row |= {name: None if progress is None else progress.get(name) for name in JUDGED}
-        text = text_of(row, progress) if before is not None else "the model to begin with"
-        rows.append({**row, "text": text, "warnings": errors.get("warnings", [])})
+        row["fitted_ug"], row["heldout_ug"] = errors["rms_ug"], errors["heldout_rms_ug"]
+        row["fresh_ug"], row["floor_ug"] = errors["fresh_rms_ug"], errors["floor_ug"]
+        progress = errors["progress"]
+        if progress is not None:
+            row["fall_ug"], row["fall_u_ug"] = progress["fall_ug"], progress["fall_u_ug"]
+            row["confirmed"], row["reason"] = progress["confirmed"], progress["reason"]
+        row["text"] = text_of(row, progress) if before is not None else "the model to begin with"
+        row["warnings"] = errors["warnings"]
+        rows.append(row)
         before = effects
     return rows
 
 
-def change_row(version: Version) -> dict[str, Any]:
-    """The change of a version with author, date and reason."""
+def change_row(version: Version) -> VersionDocument:
+    """The change of a version with author, date and reason; its errors are not judged yet."""
     change = version.change
     return {
         "version": version.number,
@@ -219,10 +212,20 @@ def change_row(version: Version) -> dict[str, Any]:
         "at": change.at.isoformat() if change else "",
         "why": change.why if change else "",
         "run": change.run if change else "",
+        "fitted_ug": None,
+        "heldout_ug": None,
+        "fresh_ug": None,
+        "floor_ug": None,
+        "fall_ug": None,
+        "fall_u_ug": None,
+        "confirmed": None,
+        "reason": None,
+        "text": "",
+        "warnings": [],
     }
 
 
-def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
+def text_of(row: VersionDocument, progress: Confirmation | None) -> str:
     """The verdict of unfitted data on a change, as text."""
     if progress is None:
         return "removed" if row["removed"] else "nothing added"
@@ -234,7 +237,7 @@ def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
         return (
             f"confirmed on stretches of time left out (log likelihood +{gain:.1f}), and the run shows no fault; {fall}"
         )
-    why = progress.get("reason") or "no judgement is possible"
+    why = progress["reason"] or "no judgement is possible"
     told = why if fall in why else f"{why}; {fall}"
     decides = "a fresh run of the same units decides"
     if gain is not None and gain > LEFT_OUT:
@@ -245,9 +248,9 @@ def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
     return f"not decided by dwells left out: {told}; {decides}"
 
 
-def _told_by_fresh(progress: dict[str, Any], fall: str) -> str:
+def _told_by_fresh(progress: Confirmation, fall: str) -> str:
     part, error = progress["part"], progress["part_u"]
-    if part is None:
+    if part is None or error is None:
         return "not decided: the dwells of the fresh run do not show the effect; measure the same poses and temperatures again"
     came = f"{part:.2f} ± {2.0 * error:.2f} (k = 2) of the predicted change appears in the fresh run"
     if progress["confirmed"] is True:
@@ -255,11 +258,11 @@ def _told_by_fresh(progress: dict[str, Any], fall: str) -> str:
     if progress["confirmed"] is False:
         return f"refuted: {came}; {fall}"
     if part > CONFIRMED * error:  # the part alone would confirm it
-        return f"not decided: {came}, but {progress.get('reason')}; {fall}; measure another run"
+        return f"not decided: {came}, but {progress['reason']}; {fall}; measure another run"
     return f"not decided: {came}; {fall}; measure another run"
 
 
-def _fall_text(progress: dict[str, Any]) -> str:
+def _fall_text(progress: Confirmation) -> str:
     """The decrease of the error with its uncertainty; of a fresh run, without what may change from day to day."""
     fall = progress["fall_ug"]
     if fall is None:

@@ -271,8 +271,8 @@ class Confirmation(TypedDict):
     part_u: Annotated[float | None, "standard uncertainty of λ"]
     fall_ug: Annotated[float | None, "decrease of the error, µg"]
     fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
-    rises: NotRequired[Annotated[str | None, "the error that rises with the effect; null: none"]]
-    reason: NotRequired[Annotated[str | None, "why it is not decided; null: it is"]]
+    rises: Annotated[str | None, "the error that rises with the effect; null: none"]
+    reason: Annotated[str | None, "why it is not decided; null: it is"]
     estimated_again: Annotated[str | None, "coefficients estimated from the fresh run before it is judged"]
     log_density: Annotated[float | None, "gain in log predictive density of the dwells left out"]
 
@@ -287,16 +287,16 @@ class ComparisonDocument(TypedDict):
     ]
     by_unit: dict[str, UnitComparison]
     by_pose: Annotated[list[PoseComparison], "worst first; empty if only the norm is known"]
-    effects: NotRequired[list[str]]
-    heldout_rms_ug: NotRequired[Annotated[float | None, "cross-validated error, µg"]]
-    by_axis: NotRequired[Annotated[dict[str, float], "µg by axis, or `norm` alone"]]
-    nonlinear: NotRequired[Annotated[dict[str, Any], "estimated parameters by effect"]]
-    nonlinear_interval: NotRequired[Annotated[dict[str, Any], "68 % interval of each parameter that all axes share"]]
-    station: NotRequired[list[StationParameter]]
+    effects: list[str]
+    heldout_rms_ug: Annotated[float | None, "cross-validated error, µg"]
+    by_axis: Annotated[dict[str, float], "µg by axis, or `norm` alone"]
+    nonlinear: Annotated[dict[str, dict[str, Any]], "estimated parameters by effect"]
+    nonlinear_interval: Annotated[dict[str, Any], "68 % interval of each parameter that all axes share"]
+    station: list[StationParameter]
     fresh_by_pose: NotRequired[list[PoseComparison]]
-    heldout: NotRequired[Annotated[dict[str, float], "cross-validated error by kind of dwells left out, µg"]]
-    warnings: NotRequired[list[str]]
-    progress: NotRequired[Annotated[Confirmation | None, "null without a version to compare with"]]
+    heldout: Annotated[dict[str, float], "cross-validated error by kind of dwells left out, µg"]
+    warnings: list[str]
+    progress: Annotated[Confirmation | None, "null without a version to compare with"]
 
 
 class VersionDocument(TypedDict):
@@ -317,9 +317,9 @@ class VersionDocument(TypedDict):
     fall_ug: Annotated[float | None, "decrease of the error by what was added, µg"]
     fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
     confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
-    reason: NotRequired[Annotated[str | None, "why it is not decided; null: it is, or nothing is judged"]]
+    reason: Annotated[str | None, "why it is not decided; null: it is, or nothing is judged"]
     text: Annotated[str, "`confirmed` as a sentence"]
-    warnings: NotRequired[list[str]]
+    warnings: list[str]
 
 
 class HistoryDocument(TypedDict):

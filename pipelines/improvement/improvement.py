@@ -9,9 +9,10 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from pipelines.diagnosis.documents import DiagnosisDocument
+from pipelines.diagnosis.documents import ComparisonDocument, DiagnosisDocument, VersionDocument
+from pipelines.improvement.documents import ImproveDocument, ImprovementChoice, LadderRow
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
@@ -65,11 +66,11 @@ def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str
 
 def errors_by_version(
     versions: Sequence[Version], tables: ImprovedTables, working: Callable[[], AbstractContextManager[Any]]
-) -> list[dict[str, Any]]:
+) -> list[VersionDocument]:
     """The errors of each version and the verdict on its change; ``working`` is entered while a version is fitted."""
     from pipelines.diagnosis.confirmation import evolution
 
-    def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
+    def compared(effects: list[str], before: list[str] | None) -> ComparisonDocument:
         with working():
             from pipelines.diagnosis.compare import compare  # loads the search for effects: after the first line
 
@@ -96,7 +97,7 @@ class Improvement:
     fresh: str
     attendant: Attendant
 
-    def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> dict[str, Any]:
+    def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> ImproveDocument:
         """The document of the improvement; the model file is written last, after all checks."""
         from pipelines.jobs.model_files import publish_model
 
@@ -125,6 +126,7 @@ class Improvement:
             "refuted": [name for row in rows if row["confirmed"] is False for name in row["added"]],
             "warnings": list(dict.fromkeys(text for row in rows for text in row["warnings"])),
             "fresh": fresh or None,
+            "next": [],
         }
 
     def _with_fresh(self, *, changed: bool) -> tuple[ImprovedTables, str]:
@@ -147,7 +149,7 @@ class Improvement:
         self.attendant.diagnosed(made, first=first)
         return made.document
 
-    def _choices(self, diagnosis: DiagnosisDocument, named: list[str], *, yes: bool) -> list[dict[str, Any]]:
+    def _choices(self, diagnosis: DiagnosisDocument, named: list[str], *, yes: bool) -> list[ImprovementChoice]:
         """For each class with a recommended effect: the effect, those that these data do not separate from it, and the answer.
 
         Raises
@@ -165,7 +167,7 @@ class Improvement:
                     f"improve: --effect {name}: the diagnosis does not name it; {did_you_mean(name, known)}; 'tumbleline "
                     "extend' adds any effect"
                 )
-        answers: list[dict[str, Any]] = []
+        answers: list[ImprovementChoice] = []
         for members in classes:
             own = [name for name in named if name in members]
             if len(own) > 1:
@@ -178,7 +180,9 @@ class Improvement:
             answers.append({"effect": effect, "not_separated_from": others, "decided_by": decided, "added": added})
         return answers
 
-    def _answer(self, effect: str, others: list[str], *, chosen: bool, named: bool, yes: bool) -> tuple[str, bool]:
+    def _answer(
+        self, effect: str, others: list[str], *, chosen: bool, named: bool, yes: bool
+    ) -> tuple[Literal["question", "--effect", "--yes", "undecided"], bool]:
         """What decided on an effect, and whether it is added."""
         if named:
             return "--effect", chosen
@@ -187,7 +191,7 @@ class Improvement:
         return "question", self.attendant.agrees(effect, others, self.target)
 
     def _versions(
-        self, effects: list[str], added: list[str], choices: list[dict[str, Any]]
+        self, effects: list[str], added: list[str], choices: list[ImprovementChoice]
     ) -> tuple[list[Version], str]:
         """The model that was judged and one version per added effect; the text of the model file, empty without a change."""
         from pipelines.jobs.model_files import Version, model_step, model_text, versions
@@ -219,12 +223,25 @@ class Improvement:
         alone = f"; these data do not separate it from {', '.join(others)}" if others else ""
         return f"a diagnosis of {Path(self.data).name} names it{alone}"
 
-    def _rows(self, versions: list[Version], noise: float | None, given: ImprovedTables) -> list[dict[str, Any]]:
+    def _rows(self, versions: list[Version], noise: float | None, given: ImprovedTables) -> list[LadderRow]:
         """Errors of each version; none where no unit can be judged."""
-        from pipelines.diagnosis.confirmation import JUDGED
-
         if noise is None:
             return []
         rows = errors_by_version(versions, given, lambda: self.attendant.working("fitting"))
-        keys = ("version", "added", "fitted_ug", "heldout_ug", "fresh_ug", *JUDGED, "text")
-        return [{key: row[key] for key in keys} | {"noise_ug": noise, "warnings": row["warnings"]} for row in rows]
+        return [
+            {
+                "version": row["version"],
+                "added": row["added"],
+                "fitted_ug": row["fitted_ug"],
+                "heldout_ug": row["heldout_ug"],
+                "fresh_ug": row["fresh_ug"],
+                "noise_ug": noise,
+                "fall_ug": row["fall_ug"],
+                "fall_u_ug": row["fall_u_ug"],
+                "confirmed": row["confirmed"],
+                "reason": row["reason"],
+                "text": row["text"],
+                "warnings": row["warnings"],
+            }
+            for row in rows
+        ]

@@ -1,12 +1,13 @@
 """Charts of a diagnosis: model and measurement, residuals on the sphere and against recorded quantities, errors by version."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
 from scipy import stats
 
 from inertial.arrays import Array, Flags, Index
+from pipelines.diagnosis.documents import VersionDocument
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace
 from pipelines.drawing.chart import Role, Symbol, between, density, level, shortened, symmetric
 from pipelines.drawing.mollweide import project, sphere
@@ -217,7 +218,7 @@ LADDER: tuple[tuple[str, str, Role, Symbol], ...] = (
 ASIDE = (-0.03, 0.0, 0.03)  # equal errors would cover each other
 
 
-def evolution_chart(rows: list[dict[str, Any]], name: str = "") -> Chart:
+def evolution_chart(rows: Sequence[VersionDocument], name: str = "") -> Chart:
     """Errors of every version beside the noise of the last; versions that a fresh run refuted are shaded.
 
     Parameters
@@ -250,6 +251,6 @@ def evolution_chart(rows: list[dict[str, Any]], name: str = "") -> Chart:
     return Chart("Error by version of the model", (plot,), height=320)
 
 
-def _label(row: dict[str, Any]) -> str:
+def _label(row: VersionDocument) -> str:
     parts = [f"+ {name}" for name in row["added"]] + [f"− {name}" for name in row.get("removed", ())]
     return " ".join(parts) or "start"

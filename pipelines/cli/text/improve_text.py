@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from inertial.counts import number_of
 from pipelines.cli.chart import Line, chart
@@ -20,6 +19,7 @@ from pipelines.cli.next_commands import (
 from pipelines.cli.printing import console, print_table, say, short, warn
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
+from pipelines.improvement.documents import ImproveDocument, LadderRow, RecordingDocument
 
 ERRORS = {
     "fitted_ug": "fitted to these dwells",
@@ -29,7 +29,7 @@ ERRORS = {
 }
 
 
-def print_improvement(document: dict[str, Any]) -> None:
+def print_improvement(document: ImproveDocument) -> None:
     """Print what was added, the ladder of errors, and the next command; the diagnoses are printed as they are made."""
     _choices(document)
     _ladder(document["ladder"])
@@ -37,7 +37,7 @@ def print_improvement(document: dict[str, Any]) -> None:
     print_next(document["next"])
 
 
-def _choices(document: dict[str, Any]) -> None:
+def _choices(document: ImproveDocument) -> None:
     for choice in document["choices"]:
         effect, others = choice["effect"], ", ".join(choice["not_separated_from"])
         text = f"{document['file']}: added {effect}" if choice["added"] else f"{effect} is not added"
@@ -48,7 +48,7 @@ def _choices(document: dict[str, Any]) -> None:
         say(text, style="" if choice["added"] else "yellow")
 
 
-def _ladder(rows: list[dict[str, Any]]) -> None:
+def _ladder(rows: list[LadderRow]) -> None:
     if not rows:
         return
     heads = [f"version {row['version']}" + "".join(f"\n+ {name}" for name in row["added"]) for row in rows]
@@ -64,7 +64,7 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
 
 
 def next_lines(
-    document: dict[str, Any], files: tuple[Path | None, Path], find: FindData, given: Given, kept: Sequence[str]
+    document: ImproveDocument, files: tuple[Path | None, Path], find: FindData, given: Given, kept: Sequence[str]
 ) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
@@ -97,9 +97,11 @@ _POSED = {"force_x", "outer"}
 STYLES = ("cyan", "green", "magenta")
 
 
-def print_recording(document: dict[str, Any]) -> None:
+def print_recording(document: ImproveDocument) -> None:
     """Print an improvement that began with a recording."""
-    one, judged = document["recording"], document["after"] or document["diagnosis"]
+    one, judged = document.get("recording"), document["after"] or document["diagnosis"]
+    if one is None:
+        return
     _recognised(one)
     print_verdict(judged)
     if not document["added"]:  # residuals and coefficients are those of the model of the import
@@ -115,15 +117,17 @@ def print_recording(document: dict[str, Any]) -> None:
     print_next(document["next"])
 
 
-def next_of_recording(document: dict[str, Any], given: Given, model: Sequence[str], kept: Sequence[str]) -> list[str]:
+def next_of_recording(
+    document: ImproveDocument, recording: RecordingDocument, given: Given, model: Sequence[str], kept: Sequence[str]
+) -> list[str]:
     """The commands to give next: the fit of a changed model; without faulty dwells, else the coefficients, else the diagnosis.
 
     model, kept : options of ``improve``: the model that was judged; the file to write and the author
     """
-    data = JudgedData(document["recording"]["run"], "", given.fresh, given.fresh_history, given=given)
+    data = JudgedData(recording["run"], "", given.fresh, given.fresh_history, given=given)
     run, words = data.source, archive_words(given.archive)
     if document["added"]:
-        return [command_line("fit", run, "--model", document["file"], *data.options), *document["next"]]
+        return [command_line("fit", run, "--model", str(document["file"]), *data.options), *document["next"]]
     if document["next"]:
         return document["next"]
     judged = document["after"] or document["diagnosis"]
@@ -134,14 +138,14 @@ def next_of_recording(document: dict[str, Any], given: Given, model: Sequence[st
         without = replace(given, leave_out=",".join(dict.fromkeys([*filter(None, [given.leave_out]), *left])))
         own = [*model, *replace(data, given=without).options, *data.again, *kept]
         return [command_line("improve", run, *own)]
-    if document["recording"]["fit"] is None and judged["adequate"] is not False:
+    if recording["fit"] is None and judged["adequate"] is not False:
         return [command_line("fit", run, "--effects", ",".join(document["effects"]), *words)]
     if judged["adequate"]:
         return [command_line("export", run, "--format", "csv", *words)]
     return [command_line("diagnose", run, "--all", *model, *data.options)]
 
 
-def _recognised(one: dict[str, Any]) -> None:
+def _recognised(one: RecordingDocument) -> None:
     rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
     axes = ", ".join(one["columns"][axis] for axis in "xyz")
     say(f"{', '.join(one['files'])}: {one['form']}, {one['rows']} rows{rate}; {number_of(one['dwells'], 'dwell')}")
@@ -152,7 +156,7 @@ def _recognised(one: dict[str, Any]) -> None:
     say(f"  kept as run {one['run']}", style="dim")
 
 
-def _picture(one: dict[str, Any]) -> None:
+def _picture(one: RecordingDocument) -> None:
     """The residual of the norm by dwell, or the drift of the outputs of one pose."""
     rows = one["dwell_list"]
     if len(rows) < 3 or one["fit"] == "faces" or _POSED & set(one["columns"]):
@@ -172,7 +176,7 @@ def _picture(one: dict[str, Any]) -> None:
     console().print(chart(title, lines, width, HEIGHT, (times[0], times[-1])), end="")
 
 
-def _missing(document: dict[str, Any]) -> None:
+def _missing(document: ImproveDocument) -> None:
     """What is missing, what was added, and the errors on dwells that were left out."""
     for choice in document["choices"]:
         others = ", ".join(choice["not_separated_from"])

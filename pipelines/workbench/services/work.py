@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.audit.finding import AuditFinding
-from pipelines.diagnosis.documents import DiagnosisDocument
+from pipelines.diagnosis.documents import DiagnosisDocument, VersionDocument
 from pipelines.drawing import Chart
 from pipelines.report.effect_view import EffectView
 from pipelines.report.residual_table import ResidualTable
@@ -121,7 +121,7 @@ def coefficients(request: Mapping[str, Any], report_progress: ReportProgress) ->
     return rows_of(changed(tables[0], tables[1], COEFFICIENT, "standard_error"))
 
 
-def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[dict[str, Any]]:
+def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[VersionDocument]:
     """The errors of every version of a model: fitted, cross-validated, on a fresh run, and the floor."""
     from contextlib import nullcontext
     from itertools import count

@@ -94,8 +94,7 @@ CASES: dict[str, tuple[dict[str, Any], str, tuple[str, ...]]] = {
 @each(CASES)
 def test_what_follows_a_recording_has_them_as_well(case: str) -> None:
     changes, name, options = CASES[case]
-    made = document(**changes) | {"recording": {"run": "R", "fit": "norm"}}
-    line = next_of_recording(made, GIVEN, ("--model", "m.toml"), KEPT)[0]
+    line = next_of_recording(document(**changes), {"run": "R", "fit": "norm"}, GIVEN, ("--model", "m.toml"), KEPT)[0]
     assert unknown_options(line) == set()
     words = shlex.split(line)[1:]
     assert words[:2] == [name, "R"]
