@@ -49,7 +49,7 @@ class DisturbanceRow(TypedDict):
     """What no noise explains in a channel of a record."""
 
     channel: str
-    kind: Literal["spikes", "loud", "bursts", "stuck", "jump"]
+    kind: Literal["spikes", "loud", "bursts", "stuck", "jump", "settling"]
     start_s: float
     stop_s: Annotated[float, "behind the last sample; of a jump where it is"]
     count: Annotated[int, "spikes, bursts, or samples"]

@@ -25,7 +25,7 @@ NOISE: dict[str, Callable[[np.random.Generator, int], np.ndarray]] = {
     "walk alone": lambda rng, n: np.cumsum(rng.standard_normal(n)),
     "1/f^2.5": lambda rng, n: 0.2 * rng.standard_normal(n) + coloured(rng, n, 2.5),
     "ramp": lambda rng, n: rng.standard_normal(n) + np.linspace(0.0, 30.0, n),
-    "warm-up": lambda rng, n: rng.standard_normal(n) + 30.0 * np.exp(-10.0 * np.arange(n) / n),
+    "bent drift": lambda rng, n: rng.standard_normal(n) + 30.0 * (np.arange(n) / n - rng.uniform()) ** 2,
     "slow wave": lambda rng, n: rng.standard_normal(n) + 5.0 * np.sin(np.arange(n) / n * 2.0 * np.pi * 7.0),
     "vibration": lambda rng, n: rng.standard_normal(n) + 3.0 * np.sin(0.7 * np.arange(n)),
     "coarse digits": lambda rng, n: np.round(0.6 * rng.standard_normal(n)),
@@ -92,3 +92,21 @@ def test_steps_on_the_floor_are_bursts_and_one_of_them_is_none(kind: str, count:
 def test_heavy_tails_are_no_bursts() -> None:
     told = [one.kind for k in range(8) for one in disturbances(np.random.default_rng([819, k]).standard_t(5, 100_000))]
     assert "bursts" not in told
+
+
+@pytest.mark.parametrize("kind", ["white", "flicker", "walk"])
+@pytest.mark.parametrize("share", [0.003, 0.01, 0.03])
+def test_a_warm_up_is_told_with_its_size_and_end(kind: str, share: float) -> None:
+    """First-order settling with a time constant of so much of the record, 25 times what the noise wanders meanwhile."""
+    for seed in range(5):
+        rng = np.random.default_rng([4411, seed])
+        n = 20_000
+        noise = NOISE[kind](rng, n)
+        later = noise[n // 2 :]
+        length = max(int(share * n), 64)
+        moved = np.std(np.diff(later[: later.size // length * length].reshape(-1, length).mean(axis=1)))
+        height = rng.choice([-1.0, 1.0]) * max(25.0 * moved, 30.0)
+        (one,) = disturbances(noise + height * np.exp(-np.arange(n) / (share * n)))
+        assert (one.kind, one.start) == ("settling", 0)
+        assert 1.0 < one.stop / (share * n) < 16.0
+        assert 0.7 < -one.size / height < 1.1
