@@ -42,7 +42,7 @@ class Driver:
     make : its columns
     values : (units, n) of the driver itself, of a suspect (blocks, n), 0 … 1 over the run; None if it is not a single quantity
     part : what of the output follows it
-    ways : ways in which each block feels the dependence, with a size for each: the columns are those of the first way, then
+    ways : ways in which each block feels the dependence, with a size for each: the columns of the first way come before
         those of the second
     period : of a swing with the time, s; None of another curve
     """
@@ -212,7 +212,9 @@ _OF_POSE = frozenset({"pose", "approach", "outer_deg", "inner_deg"})
 """Drivers that are the pose, or how it was reached."""
 
 
-def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float, beyond: Space) -> list[Misfit]:
+def misfits_of_drivers(
+    problem: Problem, drivers: list[Driver], space: Space, floor_variance: float, beyond: Space
+) -> list[Misfit]:
     """Drivers of the residuals of a space, most significant first.
 
     A temperature that drifts by hundredths of a kelvin, or the time, follows the sequence of the poses: a quantity is a driver by
@@ -232,7 +234,7 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
             misfits.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
-    # two clocks of a run explain the same: their order is not that of rounding errors
+    # two clocks of a run explain equally much: their order must not depend on rounding errors
     misfits.sort(key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
     best: dict[str, Misfit] = {}
     for misfit in misfits:

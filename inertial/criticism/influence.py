@@ -43,11 +43,11 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
     if whole <= 0.0:
         return ()
     if term is not None and of_station(term):
-        # what concerns all units is carried by a dwell in all of them: without it in one, the others say the same
+        # what concerns all units is carried by a dwell in all of them: without it in one unit, the others still show it
         return _whole_dwells(each / whole)
     influences: list[Influence] = []
-    for place in np.argsort(each, axis=None)[::-1][:_MOST].tolist():
-        unit, dwell = divmod(place, model.problem.n)
+    for index in np.argsort(each, axis=None)[::-1][:_MOST].tolist():
+        unit, dwell = divmod(index, model.problem.n)
         share = float(each[unit, dwell]) / whole
         if share <= 0.0 or sum(f.share for f in influences) > _CARRY:
             break

@@ -40,7 +40,7 @@ _UNDETERMINED = 1e-7
 """Smallest eigenvalue of P of the dwells left out, over the largest, at which the other dwells do not determine the model."""
 
 _SURELY = 1e-4
-"""Lower bound of the same ratio above which the eigenvalues of no block need be looked at."""
+"""Lower bound of that ratio above which the eigenvalues of no block need be looked at."""
 
 _ALONE = 0.9
 """Share of the sum of squares of a column in one fold, from which on the other dwells do not determine its coefficient."""
@@ -131,8 +131,8 @@ def _keeps(term: Term, judged: Term | None) -> bool:
 def _kept(model: Model, judged: Term | None) -> Flags:
     """The shared columns (q,) of a model that keep their coefficients."""
     kept = np.zeros(model.shared.shape[-1], dtype=bool)
-    for term, own in model.places(shared=True):
-        kept[own] = _keeps(term, judged)
+    for term, columns in model.slices(shared=True):
+        kept[columns] = _keeps(term, judged)
     return kept
 
 
@@ -168,17 +168,19 @@ class _Parts:
         right = np.zeros(inner.shape[0])
         held: list[tuple[_Group, Places, _Fold]] = []
         for group in self.groups:
-            places = np.flatnonzero(out & group.there)
-            if not places.size:
+            dwells = np.flatnonzero(out & group.there)
+            if not dwells.size:
                 continue
-            own = group.left_out(places)
-            if own is None:
+            fold = group.left_out(dwells)
+            if fold is None:
                 return None
-            py, pz = group.py[:, places], group.pz[:, places]
-            density += 0.5 * own.log_det - 0.5 * own.off.size * np.log(2.0 * np.pi) - 0.5 * float(np.sum(py * own.off))
-            inner -= np.einsum("bkq,bkr->qr", pz, own.across)
-            right += np.einsum("bkq,bk->q", pz, own.off)
-            held.append((group, places, own))
+            py, pz = group.py[:, dwells], group.pz[:, dwells]
+            density += (
+                0.5 * fold.log_det - 0.5 * fold.off.size * np.log(2.0 * np.pi) - 0.5 * float(np.sum(py * fold.off))
+            )
+            inner -= np.einsum("bkq,bkr->qr", pz, fold.across)
+            right += np.einsum("bkq,bk->q", pz, fold.off)
+            held.append((group, dwells, fold))
         turn = np.zeros(right.shape)
         if right.size:
             values, vectors = np.linalg.eigh(inner)
@@ -186,14 +188,14 @@ class _Parts:
                 return None
             # errors of the shared coefficients, as the other dwells determine them, in the prediction
             half = vectors / np.sqrt(values)
-            if any(own.is_blind(np.mean(np.sum((own.across @ half) ** 2, axis=-1), axis=-1)) for *_, own in held):
+            if any(fold.is_blind(np.mean(np.sum((fold.across @ half) ** 2, axis=-1), axis=-1)) for *_, fold in held):
                 return None
             turn = np.linalg.solve(inner, right)
             density += 0.5 * float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(self.inner)[1])
             density -= 0.5 * float(right @ turn)
         where = np.cumsum(out) - 1
-        for group, places, own in held:
-            missed[np.ix_(group.members, where[places])] = own.off + own.across @ turn
+        for group, dwells, fold in held:
+            missed[np.ix_(group.members, where[dwells])] = fold.off + fold.across @ turn
         return missed, density
 
 
@@ -242,22 +244,22 @@ class _Group:
     @cached_property
     def typical(self) -> Array:
         """Variance of what the model leaves of each block, (b,): nothing that it predicts should be much worse."""
-        own = np.flatnonzero(self.there)
-        root = solve_triangular(self.whitener[np.ix_(own, own)], np.eye(own.size), lower=True)
+        measured = np.flatnonzero(self.there)
+        root = solve_triangular(self.whitener[np.ix_(measured, measured)], np.eye(measured.size), lower=True)
         # P⁺ = (I − UUᵀ)V(I − UUᵀ) with an orthonormal basis U of the columns
-        basis, rank = orthonormal(self.local[:, own])
+        basis, rank = orthonormal(self.local[:, measured])
         inside = np.einsum("bnp,bnp->b", root.T @ basis, root.T @ basis)
-        return self.level**2 * (np.sum(root**2) - inside) / np.maximum(own.size - rank, 1)
+        return self.level**2 * (np.sum(root**2) - inside) / np.maximum(measured.size - rank, 1)
 
-    def left_out(self, places: Places) -> _Fold | None:
-        """The dwells at some places; None if the others determine too little.
+    def left_out(self, dwells: Places) -> _Fold | None:
+        """The fold of some dwells (k,); None if the others determine too little.
 
         (S − AᵀA)⁻¹ = S⁻¹ + S⁻¹Aᵀ(I − AS⁻¹Aᵀ)⁻¹AS⁻¹: one inverse for all blocks, and a small one for each.
         """
-        whole = self.inverse[np.ix_(places, places)]
+        whole = self.inverse[np.ix_(dwells, dwells)]
         values, vectors = np.linalg.eigh(whole)
         inverse = (vectors / values) @ vectors.T
-        rows = self.along[:, :, places]
+        rows = self.along[:, :, dwells]
         turned = rows @ inverse
         small = np.eye(rows.shape[1]) - turned @ np.swapaxes(rows, -1, -2)
         remains, directions = np.linalg.eigh(small)
@@ -267,13 +269,13 @@ class _Group:
             if bool(np.any(exact[:, 0] <= _UNDETERMINED * exact[:, -1])):
                 return None
         half = np.swapaxes(directions, -1, -2) @ turned / np.sqrt(remains)[..., None]
-        expected = (np.trace(inverse) + np.einsum("brk,brk->b", half, half)) * self.level**2 / places.size
+        expected = (np.trace(inverse) + np.einsum("brk,brk->b", half, half)) * self.level**2 / dwells.size
         alone = np.mean(1.0 / np.diagonal(whole)) * self.level**2
-        right = np.concatenate([self.py[:, places, None], self.pz[:, places]], axis=-1)
+        right = np.concatenate([self.py[:, dwells, None], self.pz[:, dwells]], axis=-1)
         solved = inverse @ right + np.swapaxes(half, -1, -2) @ (half @ right)
         solved *= self.level[:, None, None] ** 2
         log_det = float(np.sum(np.log(remains)) + len(rows) * np.sum(np.log(values)))
-        log_det -= 2.0 * places.size * float(np.sum(np.log(self.level)))
+        log_det -= 2.0 * dwells.size * float(np.sum(np.log(self.level)))
         enough = decisions.FOLD_BLIND**2 * np.maximum(alone, self.typical)
         fold = _Fold(solved[..., 0], solved[..., 1:], log_det, expected, enough)
         return None if fold.is_blind() else fold

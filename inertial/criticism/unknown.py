@@ -32,11 +32,11 @@ from inertial.estimation.term import Term
 from inertial.quantities import is_clock
 
 _KNOTS = 9  # of a smooth curve over a driver
-_TIME_KNOTS = 12  # the same over time
+_TIME_KNOTS = 12  # of a curve over time
 _FEW_KNOTS = 6  # of a smooth dependence of the scale factors
 _WIDE_KNOTS = 6  # of a smooth curve of the misalignment
-_TURNED_KNOTS = 2  # of the same for the fixture's rotation, whose every column has three coefficients of the whole lot
-_FORCE_KNOTS = 7  # of the same over the force along an axis
+_TURNED_KNOTS = 2  # of a curve of the fixture's rotation, whose every column has three coefficients of the whole lot
+_FORCE_KNOTS = 7  # of a curve over the force along an axis
 _HARMONICS = 5  # of a table angle
 _CYCLES = np.arange(1.0, 14.1, 0.5)  # of a swing within the run
 _BETWEEN = (0.125, 0.05, 0.02)  # steps of the cycles between two of them
@@ -81,11 +81,11 @@ def suspects(problem: Problem) -> list[Driver]:
             if steps is not None:
                 suspected.append(Driver(name, _alike(problem, steps)))
             if not problem.lot.radial and knots > 2:
-                # the same dependence of the scale factors: what the driver changes is then felt along each axis
+                # a dependence of the scale factors: what the driver changes is then felt along each axis
                 suspected.append(Driver(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
     if not problem.lot.radial:
-        own = own_forces(problem).reshape(problem.blocks, problem.n)
-        suspected.append(Driver("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
+        force = own_forces(problem).reshape(problem.blocks, problem.n)
+        suspected.append(Driver("pose", _columns(curve(force, _KNOTS)), _unit_range(force)))
         suspected += _table(problem)
     whole = max(float(np.ptp(state.time)), 1.0)
     return [*suspected, *(_swing(problem, whole / cycles) for cycles in _CYCLES)]
@@ -105,10 +105,10 @@ def wide_suspects(problem: Problem) -> list[Driver]:
     for name, values, _ in quantities(state):
         if not varies(values) or (name == "chamber_C" and alike(values, state.temperature)):
             continue
-        own = curve(values, _WIDE_KNOTS)  # (units or 1, n, d)
-        if own.shape[-1] < 2:  # a line, or levels that handling errors already are
+        driver_curve = curve(values, _WIDE_KNOTS)  # (units or 1, n, d)
+        if driver_curve.shape[-1] < 2:  # a line, or levels that handling errors already are
             continue
-        suspected.append(Driver(name, _columns(across(along, own, problem.axes)), ways=2, part="axes"))
+        suspected.append(Driver(name, _columns(across(along, driver_curve, problem.axes)), ways=2, part="axes"))
         turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
         whole = np.broadcast_to(turned, (problem.blocks // problem.per_unit, *turned.shape[1:]))
         columns = by_block(of_outputs(problem.lot, whole.reshape(*whole.shape[:3], -1)))
@@ -243,7 +243,7 @@ def _sharp(model: Model, suspect: Driver) -> CurveFit | None:
 
 
 def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
-    """Column of a bump whose place and width are refined between those of the grid."""
+    """Column of a bump whose position and width are refined between the values of the grid."""
     space = model.space
     column = np.zeros(0)
     for reach in (0.5, 0.2):
@@ -289,7 +289,7 @@ def _alike(problem: Problem, columns: Array) -> Callable[[], Candidate]:
 
 
 def _columns(columns: Array, *, shared: bool = False) -> Callable[[], Candidate]:
-    """Columns (blocks, n, d) that are kept: every search looks at them again."""
+    """Columns (blocks, n, d) that are stored: every search looks at them again."""
     candidate = Candidate(columns[:, :, None, :], shared=shared)
     return lambda: candidate
 
@@ -308,7 +308,7 @@ def _swing(problem: Problem, period: float) -> Driver:
 
 
 def _tuned(base: Model, fit: CurveFit) -> CurveFit:
-    """A swing with its period between those of the grid; any other curve as it is."""
+    """A swing with its period refined between the values of the grid; any other curve as it is."""
     if fit.driver.period is None:
         return fit
     whole = float(np.ptp(base.problem.lot.state.time))

@@ -43,7 +43,7 @@ class Verdict:
     run, search, drivers : the examined lot, the search for effects in it, and the recorded quantities
     result : of the search; without effects where the data cannot judge the model
     final : the model with all identified effects
-    beside : the same with a curve that would else count as noise; drivers are judged at its noise
+    beside : that model with a curve that would else count as noise; drivers are judged at its noise
     unexplained : a driver that no effect explains
     removed : single dwells that were left out, those marked that are tails of the noise
     rms : of the residuals of the judged model; floor : of the noise of the measurement, white and wander
@@ -103,7 +103,9 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     rng : draws the noise that adequacy is measured against
     """
     verdict = _judged(lot, effects, rng)
-    told = [m.term for one in verdict.run.handled for m in one.effects.members if isinstance(m.term.effect, Handling)]
+    told = [
+        m.term for named in verdict.run.handled for m in named.effects.members if isinstance(m.term.effect, Handling)
+    ]
     if not told or (verdict.unexplained is None and not verdict.result.added):
         return verdict
     # found before the driver or the effect was: what that leaves over may have looked like an error of handling
@@ -112,7 +114,7 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
 
 
 def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
-    """Whether the same explains a lot as well without the errors of handling that were told beside it."""
+    """Whether what explains a lot does so as well without the errors of handling that were named beside it."""
     if other.handled or _bad(other) > _bad(verdict) or _causes(other) != _causes(verdict):
         return False
     model = _as_found(other, verdict) if other.unexplained is None else other.unexplained.model
@@ -127,7 +129,7 @@ def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
 def _as_found(other: Verdict, verdict: Verdict) -> Model:
     """The model of a verdict with the effects as another one found them, and what each remembers from before the run free.
 
-    As they were found: an effect that changes its place to that of an error, as a step does, has replaced the error and does not
+    As they were found: an effect that moves to the dwell of an error, as a step does, has replaced the error and does not
     refute it. Devices that were not at rest leave something over in the first dwells: for that they take many coefficients, and a
     pose that was wrong there takes two.
     """

@@ -36,7 +36,7 @@ _DOF = 3.0
 """Degrees of freedom of the heavy part: P(|x| > z) falls off as z⁻³."""
 
 _SCALES = np.geomspace(0.7, 1.3, 25)
-"""Standard deviations of the noise over the RMS of the dwells that were kept."""
+"""Standard deviations of the noise over the RMS of the dwells that were not left out."""
 
 _FURTHEST, _STEP = 60.0, 0.02
 """Range and step of the tables, standard deviations."""
@@ -107,20 +107,20 @@ class _Noise:
         return total
 
 
-def _probability_beyond(place: int, z: Array) -> Array:
-    """P(|x| > z) of a value of variance one; ``place`` is the index of the share of its heavy tails."""
-    share = _SHARES[place]
+def _probability_beyond(index: int, z: Array) -> Array:
+    """P(|x| > z) of a value of variance one; ``index``: of its share of heavy tails in ``_SHARES``."""
+    share = _SHARES[index]
     if share == 0.0:
         return 2.0 * normal_tail(z)
-    grid, _, distribution = _table(place)
+    grid, _, distribution = _table(index)
     near = 2.0 * (1.0 - np.interp(z, grid, distribution))
     return np.where(z < _TAIL, near, 2.0 * student_tail(z / np.sqrt(share / _DOF), _DOF))
 
 
 @cache
-def _table(place: int) -> tuple[Array, Array, Array]:
+def _table(index: int) -> tuple[Array, Array, Array]:
     """Values from zero on, density and distribution of a normal part plus a heavy one, together of variance one."""
-    share, half = _SHARES[place], round(_FURTHEST / _STEP)
+    share, half = _SHARES[index], round(_FURTHEST / _STEP)
     grid = _STEP * np.arange(-half, half + 1)
     edges = np.append(grid - 0.5 * _STEP, grid[-1] + 0.5 * _STEP)
     mass = np.diff(normal_tail(-edges / max(np.sqrt(1.0 - share), 1e-9)))

@@ -99,8 +99,8 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
 def _shrinkable(model: Model, count: int) -> Flags:
     """The local coefficients that are shrunk: those of the effects beyond bias, scale and misalignment."""
     flags = np.zeros(count, dtype=bool)
-    for term, own in model.places(shared=False):
-        flags[own] = term.effect.id not in OWN
+    for term, columns in model.slices(shared=False):
+        flags[columns] = term.effect.id not in OWN
     return flags
 
 

@@ -78,10 +78,10 @@ def _of_soak(model: Model, series: Array, places: Places) -> Array:
     q: Array | None = None
     known: dict[tuple[object, ...], float] = {}
     for block in range(problem.blocks):
-        own = there[block]
-        if np.count_nonzero(own) < _FEWEST:
+        present = there[block]
+        if np.count_nonzero(present) < _FEWEST:
             continue
-        here = force[block // problem.per_unit][own], time[block // problem.per_unit][own]
+        here = force[block // problem.per_unit][present], time[block // problem.per_unit][present]
         if before is None or not all(map(np.array_equal, here, before)):
             # the axes of a unit, and units in the same poses at the same times, have the same columns
             before, x = here, _columns(*here)
@@ -89,11 +89,11 @@ def _of_soak(model: Model, series: Array, places: Places) -> Array:
             known.clear()
         if q is None:
             continue
-        y = series[block, places[own]]
-        left[block, own] = y - q @ (q.T @ y)
+        y = series[block, places[present]]
+        left[block, present] = y - q @ (q.T @ y)
         like = covariance.like_of(block, model.noise)
         if like not in known:
-            root = np.linalg.cholesky(covariance.of_dwells(block, model.noise, places[own]))
+            root = np.linalg.cholesky(covariance.of_dwells(block, model.noise, places[present]))
             noise = root @ drawn[: len(root)]
             noise -= q @ (q.T @ noise)
             size = float(covariance.level[block] * model.noise.scale[block])

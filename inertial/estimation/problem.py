@@ -24,7 +24,7 @@ _PIECE = 1_000_000
 """Number of columns processed at a time."""
 
 _WIDE = 3_000_000
-"""The same of the columns of one effect at several values: each pass over them goes through the model's own columns once."""
+"""Number of elements of an effect's columns that are processed at a time: each pass also goes through the model's columns."""
 
 _WIDEST = 3
 """Usual largest number of columns of an effect per axis."""
@@ -91,7 +91,7 @@ class Problem:
         return Covariance(time, self.error, self._direction if self.lot.radial else None, self.lot.loudness)
 
     def forget(self) -> None:
-        """Drop the columns and products that are kept: they are made again where they are needed."""
+        """Drop the stored columns and products: they are made again where they are needed."""
         self._kept.clear()
         self._terms.clear()
         self._room = _CACHE
@@ -151,7 +151,7 @@ class Problem:
                     effect,
                     values,
                     self.axes,
-                    lambda axis, own: excited(effect, effect.columns(state, axis, **own)),
+                    lambda axis, nonlinear: excited(effect, effect.columns(state, axis, **nonlinear)),
                 )
             )
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
@@ -165,7 +165,9 @@ class Problem:
         state = self.lot.state
         if isinstance(effect, SensorEffect):
             return self._by_axis(
-                _of_axes(effect, values, self.axes, lambda axis, own: effect.start_columns(state, axis, **own))
+                _of_axes(
+                    effect, values, self.axes, lambda axis, nonlinear: effect.start_columns(state, axis, **nonlinear)
+                )
             )
         return self.seen(effect.start_change(state, **on_axis(values, 0)))
 
@@ -204,7 +206,7 @@ class Problem:
         return self._stored(key, lambda: self.varied(effect, grid, first=first, key=key))
 
     def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
-        """A candidate, made where it is not kept, and kept where its columns have room."""
+        """A candidate, from the store or made; stored where its columns have room."""
         kept = self._kept.get(key)
         if kept is None:
             kept = make()
@@ -227,31 +229,31 @@ class Problem:
         start: bool = False,
         key: object = None,
     ) -> Candidate:
-        """Columns of an effect over values, those of one value after another; rows that blocks share are stored once.
+        """Columns of an effect over values, value after value; rows that blocks share are stored once.
 
         Parameters
         ----------
         start : whether columns of the unknown state of a memory follow
-        key : under which the candidate is kept; None where it is tried once
+        key : under which the candidate is stored; None where it is tried once
         """
         shared = effect.scope in SHARED
         every: list[Array] = []
         rows_of: list[Places | None] = []
         for values in grid:
             known = self._terms.get((effect.id, *values.items()))
-            own = (self._columns(effect, values) if known is None else known)[..., :first]
+            part = (self._columns(effect, values) if known is None else known)[..., :first]
             if start:
-                own = np.concatenate([own, self.start(effect, values)], axis=-1)
-            rows = None if shared else shared_rows(own, self.per_unit)
-            every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
+                part = np.concatenate([part, self.start(effect, values)], axis=-1)
+            rows = None if shared else shared_rows(part, self.per_unit)
+            every.append(part if rows is None else part[np.unique(rows, return_index=True)[1]])
             rows_of.append(rows)
         rows = finest_rows(rows_of, self.per_unit)
         count = self.blocks if rows is None else int(rows.max()) + 1
         columns = np.empty((count, len(grid), every[0].shape[-1], self.n))
-        for place, (own, of_own) in enumerate(zip(every, rows_of, strict=True)):
-            if len(own) < count and of_own is not None:
-                own = own[of_own if rows is None else of_own[np.unique(rows, return_index=True)[1]]]  # noqa: PLW2901
-            columns[:, place] = np.swapaxes(own, -1, -2)
+        for k, (part, of_own) in enumerate(zip(every, rows_of, strict=True)):
+            if len(part) < count and of_own is not None:
+                part = part[of_own if rows is None else of_own[np.unique(rows, return_index=True)[1]]]  # noqa: PLW2901
+            columns[:, k] = np.swapaxes(part, -1, -2)
         return Candidate(columns.transpose(0, 3, 1, 2), shared, rows=rows, key=key)
 
     def pieces(
@@ -270,7 +272,7 @@ class Problem:
                 size = max(1, _PIECE // made.columns[:, :, 0].size)
 
     def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
-        """The places of an alternative, those of units one unit after another, no more at a time than a piece has room for."""
+        """Columns of an alternative at its locations, unit after unit, no more at a time than a piece has room for."""
         if grid and ("unit" not in grid[0] or "other" in grid[0]):
             alike = len(effect.change(self.lot, self.slope, **on_axis(grid[0], 0))) == 1
             size = max(1, _PIECE // ((len(self.axes) if alike else self.blocks) * self.n * _WIDEST))
@@ -279,12 +281,12 @@ class Problem:
             return
         by_unit = [list(places) for _, places in groupby(grid, key=lambda values: values["unit"])]
         for places, alike in groupby(by_unit, key=_without_unit):
-            units = np.array([int(on_axis({"unit": own[0]["unit"]}, 0)["unit"]) for own in alike])
+            units = np.array([int(on_axis({"unit": of_unit[0]["unit"]}, 0)["unit"]) for of_unit in alike])
             size = max(1, _PIECE // (len(self.axes) * self.n * _WIDEST * len(places)))
-            yield from self._of_units(effect, units, [dict(place) for place in places], size)
+            yield from self._of_units(effect, units, [dict(location) for location in places], size)
 
     def _of_units(self, effect: Handling, units: Places, places: Sequence[Values], size: int) -> Iterator[Candidate]:
-        """The places of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
+        """Columns of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
         key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
 
         def made() -> Candidate:
@@ -307,7 +309,7 @@ class Problem:
             yield replace(kept, columns=kept.columns[blocks], units=some, key=(*key, start, size))
 
     def _together(self, effect: Handling, places: Sequence[Values]) -> Candidate:
-        """An alternative of the whole lot at some places."""
+        """Columns of an alternative of the whole lot at some locations."""
         key = (effect.id, len(places), *places[0].items(), *places[-1].items())
 
         def made() -> Candidate:
@@ -322,5 +324,5 @@ class Problem:
 
 
 def _without_unit(places: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:
-    """Places of one unit as a key, without the unit."""
-    return tuple(tuple((name, value) for name, value in place.items() if name != "unit") for place in places)
+    """Locations in a unit as a key, without the unit."""
+    return tuple(tuple((name, value) for name, value in location.items() if name != "unit") for location in places)

@@ -157,9 +157,9 @@ class ShareStatistics:
         if common not in self._kept:
             self._kept = {common: self._made(common)}  # the last alone: a search for shares seldom goes back
         products = self._kept[common]
-        if shares.own:
+        if shares.by_block:
             products = products.copy()
-            for block, flicker, walk in shares.own:
+            for block, flicker, walk in shares.by_block:
                 products[block] = self._of_block(block, Shares(flicker, walk))
         return products
 
@@ -167,8 +167,8 @@ class ShareStatistics:
         covariance = self.problem.covariance
         columns, places = self._distinct
         out = np.empty((self.problem.blocks, places.shape[1], places.shape[1]))
-        for members, own, rows in covariance.solved(columns, places, shares):
-            each = np.searchsorted(own, places[members])
+        for members, distinct, rows in covariance.solved(columns, places, shares):
+            each = np.searchsorted(distinct, places[members])
             few = max(PIECE // (each.shape[1] * self.problem.n), 1)
             for some in (slice(start, start + few) for start in range(0, members.size, few)):
                 out[members[some]] = rows[each[some]] @ np.swapaxes(self._rows[members[some]], -1, -2)

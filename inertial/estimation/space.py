@@ -92,8 +92,8 @@ class Space:
         for some in np.split(np.arange(blocks), range(few, blocks, few)):
             columns = np.concatenate([y[some, :, None], shared[some], local[some]], axis=-1)
             white = covariance.whiten(columns, noise.shares, some) / noise.scale[some, None, None]
-            self.q[some], self.ranks[some], own = basis(white[..., t:])
-            self._log_determinant += own
+            self.q[some], self.ranks[some], log_determinant = basis(white[..., t:])
+            self._log_determinant += log_determinant
             self.targets[some] = self.project(white[..., :t], some)
         self.gram = np.einsum("bnt,bns->ts", self.targets, self.targets)
         self.local_rank = int(self.ranks.sum())
@@ -226,7 +226,7 @@ class Space:
         columns : (blocks, n, p), of every dwell; places : (grid,), the dwells
         """
         n, p = columns.shape[1:]
-        inside, own = np.zeros((n, p, self.targets.shape[-1])), np.zeros((n, p, p))
+        inside, left = np.zeros((n, p, self.targets.shape[-1])), np.zeros((n, p, p))
         size = np.zeros((n, p))
         for members, whitener in self.covariance.whiteners(self.noise.shares):
             scale = (self.covariance.level * self.noise.scale)[members, None]
@@ -236,10 +236,10 @@ class Space:
             whole = np.sum(whitener**2, axis=0) / scale**2
             diagonal = np.maximum(whole - np.einsum("brn,brn->bn", along, along) / scale**2, 0.0)
             inside += np.einsum("bnp,btn->npt", columns[members], back / scale[..., None])
-            own += np.einsum("bnp,bnr,bn->npr", columns[members], columns[members], diagonal)
+            left += np.einsum("bnp,bnr,bn->npr", columns[members], columns[members], diagonal)
             size += np.einsum("bnp,bn->np", columns[members] ** 2, whole)
         size = np.sqrt(np.where(size > 0.0, size, 1.0))
-        return self._solved((own / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places])
+        return self._solved((left / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places])
 
     def _gain_along(self, along: Array, seen: Flags) -> Gain:
         rank = seen.sum(axis=(0, 2))
@@ -269,22 +269,22 @@ class Space:
     def _gain_shared(self, found: Products, *, per_unit: int | None) -> Gain:
         """Gain of columns whose coefficients all blocks share, or those of each unit: units in turn, all values of each."""
         together = per_unit or found.whole.shape[0]
-        own, squares, inside = (
+        left, squares, inside = (
             each.reshape(-1, together, *each.shape[1:]).sum(axis=1).reshape(-1, *each.shape[2:])
             for each in (found.left, found.squares, found.inside)
         )
         size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
-        return self._solved(own / (size[:, :, None] * size[:, None, :]), inside / size[..., None])
+        return self._solved(left / (size[:, :, None] * size[:, None, :]), inside / size[..., None])
 
-    def _solved(self, own: Array, inside: Array) -> Gain:
+    def _solved(self, left: Array, inside: Array) -> Gain:
         """Gain from products (grid, p, p) of common columns with each other and (grid, p, t) with the targets."""
         along = inside[..., 0]
         if self.targets.shape[-1] > 1:
             inner = np.linalg.pinv(self.gram[1:, 1:], rcond=1e-10, hermitian=True)
-            own = own - inside[..., 1:] @ inner @ np.swapaxes(inside[..., 1:], -1, -2)
+            left = left - inside[..., 1:] @ inner @ np.swapaxes(inside[..., 1:], -1, -2)
             along = along - inside[..., 1:] @ (inner @ self.gram[1:, 0])
-        values, vectors = eigen(own)
+        values, vectors = eigen(left)
         seen = values > SEEN**2
         onto = np.einsum("gpr,gp->gr", vectors, along)
         drop = np.sum(np.where(seen, onto**2 / np.where(seen, values, 1.0), 0.0), axis=1)
-        return Gain(drop, seen.sum(axis=1), np.zeros((0, len(own))))
+        return Gain(drop, seen.sum(axis=1), np.zeros((0, len(left))))

@@ -61,7 +61,7 @@ def _lacks_in_a_lot(error: Handling, lot: Lot) -> list[str]:
     """What it lacks of places, columns and words in a lot in which it can be."""
     units, n = lot.state.time.shape
     slope = np.full((units, n, 3), 1e-5)
-    places = error.places(lot)
+    places = error.locations(lot)
     if not places:
         return ["a place in a lot with everything recorded"]
     place = places[len(places) // 2]

@@ -41,7 +41,7 @@ def _exchanged(readings: Readings) -> Iterator[int]:
     warm = readings.warm
     theta = None if warm is None or not np.isfinite(warm[readings.there]).all() else warm
     output = readings.output
-    fit = PlainFit(output, readings.force, theta, readings.there, lambda one, other: output[[other, one]])
+    fit = PlainFit(output, readings.force, theta, readings.there, lambda unit, partner: output[[partner, unit]])
     for pair in fit.pairs():
         if fit.ranges(*pair):
             yield from pair
