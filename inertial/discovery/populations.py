@@ -54,8 +54,8 @@ def two_populations(values: Array, rng: Generator) -> TwoPopulations | None:
     z = rng.permutation((known - centre) / scale)
     halves = z[0::2], z[1::2]
     ways = [
-        float(np.sum(np.logaddexp(*_parts(other, *_fitted(own))))) - _one_peak(other)
-        for own, other in (halves, halves[::-1])
+        float(np.sum(np.logaddexp(*_parts(test, *_fitted(training))))) - _one_peak(test)
+        for training, test in (halves, halves[::-1])
     ]
     log_e = float(special.logsumexp(ways) - np.log(2.0))
     weights, means, widths = _fitted(z)

@@ -60,7 +60,7 @@ class Wander:
     def __init__(self, count: int) -> None:
         self.stations: dict[str, Level] = {}
         self.log_likelihood: Array = np.zeros((WALKS.size, count))
-        self.beside: dict[str, Array] = {}  # the same with a driver's prediction in it
+        self.beside: dict[str, Array] = {}  # the likelihood with a driver's prediction in it
         self._scale, self._lots = np.zeros(count), np.zeros(count)
 
     @property

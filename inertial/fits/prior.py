@@ -83,8 +83,8 @@ def judged(
     """
     shape = covariance.shape
     mean, within, between = (
-        np.array(np.broadcast_to(one, over))
-        for one, over in ((family.mean, shape[:-1]), (family.within, shape), (family.between, shape))
+        np.array(np.broadcast_to(moment, over))
+        for moment, over in ((family.mean, shape[:-1]), (family.within, shape), (family.between, shape))
     )
     for k, unit in enumerate(units):
         if unit in family.own:

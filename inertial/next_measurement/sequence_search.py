@@ -97,15 +97,15 @@ class Offers:
     def _per_minute(self, gain: float, minutes: float) -> float:
         return gain / (minutes - self.spent + 1.0)  # a minute for the start of the follow-up
 
-    def _offer(self, place: int) -> Offer | None:
+    def _offer(self, index: int) -> Offer | None:
         """The sequence with what it brings; None if that is too little."""
-        if place not in self._judged:
-            course, minutes = self.open[place]
+        if index not in self._judged:
+            course, minutes = self.open[index]
             worth = self.search.share([*self.chosen, course])
             gain, least = worth - self.now, min(self.search.least, 0.5 * (1.0 - self.now))
             offer = Offer(course, worth, minutes, self._per_minute(gain, minutes)) if gain >= least else None
-            self._judged[place] = offer
-        return self._judged[place]
+            self._judged[index] = offer
+        return self._judged[index]
 
     def by_kind(self) -> Iterator[Offer]:
         """The best of each kind by gain per minute, the best first."""
@@ -115,9 +115,9 @@ class Offers:
         given: set[Kind] = set()
         while waiting or ready:
             if waiting and (not ready or bound[waiting[0]] >= -ready[0][0]):
-                place = waiting.pop(0)
-                if self.open[place][0].kind not in given and (offer := self._offer(place)) is not None:
-                    heapq.heappush(ready, (-offer.rate, place, offer))
+                index = waiting.pop(0)
+                if self.open[index][0].kind not in given and (offer := self._offer(index)) is not None:
+                    heapq.heappush(ready, (-offer.rate, index, offer))
                 continue
             offer = heapq.heappop(ready)[2]
             if offer.course.kind not in given:
@@ -125,11 +125,11 @@ class Offers:
                 yield offer
 
     def shortest(self, worth: float, below: float) -> Offer | None:
-        """The shortest of the sequences that alone reach a share of the aim in less than some minutes; None without one."""
-        for place in sorted(range(len(self.open)), key=lambda k: self.open[k][1]):
-            if self.open[place][1] >= below:
+        """The shortest sequence that alone reaches a share of the aim in less than some minutes; None if none does."""
+        for index in sorted(range(len(self.open)), key=lambda k: self.open[k][1]):
+            if self.open[index][1] >= below:
                 return None
-            offer = self._offer(place)
+            offer = self._offer(index)
             if offer is not None and offer.worth >= worth:
                 return offer
         return None
