@@ -102,16 +102,16 @@ def _divided(sums: Array, n: int, most: int, shortest: int, penalty: float) -> l
     cuts: list[int] = []
 
     def offer(a: int, b: int) -> None:
-        gain, place = _best(sums, a, b, shortest)
-        if place > a and gain > penalty:
-            heapq.heappush(queue, (-gain, place, a, b))
+        gain, cut = _best(sums, a, b, shortest)
+        if cut > a and gain > penalty:
+            heapq.heappush(queue, (-gain, cut, a, b))
 
     offer(0, n)
     while queue and len(cuts) < most:
-        _, place, a, b = heapq.heappop(queue)
-        cuts.append(place)
-        offer(a, place)
-        offer(place, b)
+        _, cut, a, b = heapq.heappop(queue)
+        cuts.append(cut)
+        offer(a, cut)
+        offer(cut, b)
     return cuts
 
 
@@ -131,8 +131,8 @@ def _refined(sums: Array, edges: list[int], shortest: int) -> list[int]:
     for _ in range(3):
         before = list(edges)
         for k in range(1, len(edges) - 1):
-            gain, place = _best(sums, edges[k - 1], edges[k + 1], shortest)
-            edges[k] = place if gain > 0.0 else edges[k]
+            gain, cut = _best(sums, edges[k - 1], edges[k + 1], shortest)
+            edges[k] = cut if gain > 0.0 else edges[k]
         if edges == before:
             break
     return edges

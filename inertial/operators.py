@@ -115,12 +115,12 @@ class _Clamps:
         whole = np.zeros((stretches * size, self._rows))
         whole[: self._count] = step
         # (size, stretches, rows)
-        own = np.ascontiguousarray(np.swapaxes(whole.reshape(stretches, size, self._rows), 0, 1))
-        self._shift = np.cumsum(own, axis=0)
+        steps = np.ascontiguousarray(np.swapaxes(whole.reshape(stretches, size, self._rows), 0, 1))
+        self._shift = np.cumsum(steps, axis=0)
         self._ends = np.empty((size, 2, stretches, self._rows))
         ends = np.empty((2, stretches, self._rows))
         ends[0], ends[1] = -1.0, 1.0
-        for change, clamped in zip(own, self._ends, strict=True):
+        for change, clamped in zip(steps, self._ends, strict=True):
             np.add(ends, change, out=clamped)
             np.maximum(clamped, -1.0, out=clamped)
             np.minimum(clamped, 1.0, out=clamped)

@@ -92,9 +92,9 @@ def linearity_error(polynomial: Polynomial, full_scale_g: float) -> float:
     """
     x = np.linspace(-full_scale_g, full_scale_g, 2001)
     each = _apart(x, columns(x, polynomial.names))
-    place = each[int(np.argmax(np.abs(each @ polynomial.value)))]
+    row = each[int(np.argmax(np.abs(each @ polynomial.value)))]
     gain = abs(polynomial.of("scale")[0])
-    return float(100.0 * np.sqrt(place @ polynomial.covariance @ place) / (gain * full_scale_g))
+    return float(100.0 * np.sqrt(row @ polynomial.covariance @ row) / (gain * full_scale_g))
 
 
 def _apart(x: Array, y: Array) -> Array:

@@ -97,7 +97,7 @@ def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence
 
 def _judged(points: Spins, output: Array, error: Array, effects: Sequence[str]) -> Judged[SpinFit]:
     """The verdict on a model on all of the points."""
-    seen = [name for name, one in EFFECTS.items() if one.seen(points)]
+    seen = [name for name, effect in EFFECTS.items() if effect.seen(points)]
     names = [name for name in effects if name in seen]
 
     def without_worst(fit: SpinFit) -> tuple[SpinFit, int]:

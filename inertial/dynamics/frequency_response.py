@@ -113,9 +113,9 @@ def _lines(wave: Array, rate_hz: float, seconds: float, count: int) -> Complex:
 def _delay(x: Complex, y: Complex, seconds: float) -> float:
     """The delay of the output, s, by the largest correlation: a phase that turns within a band would lower its average."""
     cross = np.fft.irfft(np.concatenate([[0.0], np.conj(x) * y]))
-    place = int(np.argmax(np.abs(cross)))
-    place -= cross.size if place > cross.size // 2 else 0
-    return place * seconds / cross.size
+    lag = int(np.argmax(np.abs(cross)))
+    lag -= cross.size if lag > cross.size // 2 else 0
+    return lag * seconds / cross.size
 
 
 def _edges(f: Array, per_octave: int) -> list[tuple[int, int]]:

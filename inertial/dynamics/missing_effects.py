@@ -109,7 +109,7 @@ class Judged(Generic[AnyFit]):
     @property
     def recommended(self) -> tuple[str, ...]:
         """One effect per class, the best of it."""
-        return tuple(one.effects[0] for one in self.classes)
+        return tuple(effect_class.effects[0] for effect_class in self.classes)
 
 
 @dataclass(frozen=True)
@@ -126,8 +126,10 @@ class BadPoint(Generic[AnyFit]):
 
 def breakers_of(classes: Sequence[EffectClass], effects: Mapping[str, DynamicEffect]) -> tuple[str, ...]:
     """The measurements that separate the first two members of each class of several effects."""
-    open_classes = [one for one in classes if len(one.effects) > 1]
-    return tuple(dict.fromkeys(effects[name].breaker for one in open_classes for name in one.effects[:2]))
+    open_classes = [effect_class for effect_class in classes if len(effect_class.effects) > 1]
+    return tuple(
+        dict.fromkeys(effects[name].breaker for effect_class in open_classes for name in effect_class.effects[:2])
+    )
 
 
 def judge(
@@ -217,9 +219,9 @@ def _departs_alone(fit: Fitted, rest: Fitted, rival: Fitted, price: float, *, so
     if values <= 0:
         return False
     points = fit.dof / values
-    place = 2.0 * float(np.log(points))
+    choice = 2.0 * float(np.log(points))
     gain = (fit.chi_square - rest.chi_square) / max(1.0, rest.chi_square / max(rest.dof, 1))
-    ahead = _score(rest, price) + place < _score(rival, price) + place * sought
+    ahead = _score(rest, price) + choice < _score(rival, price) + choice * sought
     return bool(points * chi2_tail(gain, values) < ADDED_P) and ahead
 
 

@@ -65,8 +65,8 @@ class TiltFit:
         K2·sin² departs by −½·K2·cos 2θ and K3·sin³ by −¼·K3·sin 3θ from a constant and a sine. At θ = 90° and 270° both are
         largest, once with equal and once with opposite signs: ½·|K2| + ¼·|K3|, magnitudes without the share of their noise.
         """
-        place = [self.names.index(name) for name in TERMS[3:]]
-        value, covariance = self.value[place], self.covariance[np.ix_(place, place)]
+        terms = [self.names.index(name) for name in TERMS[3:]]
+        value, covariance = self.value[terms], self.covariance[np.ix_(terms, terms)]
         error = np.sqrt(np.diag(covariance))
         share = np.array([0.5, 0.25])
         sizes = np.array([magnitude(float(v), float(e)) for v, e in zip(value, error, strict=True)])
@@ -81,7 +81,7 @@ class TiltFit:
         other : fit of the other axis at the same angles
         angle_error : standard uncertainty of each angle, rad
         """
-        shares = [one.phase_slope() * one.scale[0] * np.cos(one.angle + one.phase[0]) for one in (self, other)]
+        shares = [fit.phase_slope() * fit.scale[0] * np.cos(fit.angle + fit.phase[0]) for fit in (self, other)]
         return float(angle_error**2 * (shares[0] @ shares[1]))
 
     def phase_slope(self) -> Array:

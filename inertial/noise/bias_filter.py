@@ -146,7 +146,7 @@ def first_covariances(model: BiasModel) -> Array:
     parts = model.sd.shape[1] + 1
     first = np.concatenate([model.sd**2, model.turn_on[:, None] ** 2], axis=1)
     into = np.vstack([np.eye(parts), np.ones(parts)])
-    return np.stack([into @ np.diag(own) @ into.T for own in first])
+    return np.stack([into @ np.diag(variances) @ into.T for variances in first])
 
 
 def transitions_by_axis(model: BiasModel, seconds: float, *, mean: bool) -> tuple[Array, Array]:
@@ -165,10 +165,10 @@ def _axis_step(parts: list[StepOfProcess]) -> tuple[Array, Array]:
     """Transition (w, w) and added covariance (w, w) of the state of one axis: its parts, then their common mean."""
     k = len(parts)
     phi, grown = np.zeros((k + 1, k + 1)), np.zeros((k + 1, k + 1))
-    for place, part in enumerate(parts):
-        phi[place, place], phi[k, place] = part.keep, part.weight
-        grown[place, place] = part.end_variance
-        grown[place, k] = grown[k, place] = part.covariance
+    for index, part in enumerate(parts):
+        phi[index, index], phi[k, index] = part.keep, part.weight
+        grown[index, index] = part.end_variance
+        grown[index, k] = grown[k, index] = part.covariance
     grown[k, k] = sum(part.mean_variance for part in parts)
     return phi, grown
 

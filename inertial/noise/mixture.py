@@ -132,10 +132,10 @@ class MixtureFit:
         held = strengths[~free]
         if held.any():
             right_side = right_side - rows[:, ~free] @ held
-        own = rows[:, free]
-        size = np.sqrt(np.sum(own * own, axis=0))
+        columns = rows[:, free]
+        size = np.sqrt(np.sum(columns * columns, axis=0))
         trial = strengths.copy()
-        trial[free] = nnls(own / size, right_side)[0] / size
+        trial[free] = nnls(columns / size, right_side)[0] / size
         return trial
 
 

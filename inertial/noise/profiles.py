@@ -88,8 +88,8 @@ def _walk_limit(variance: Array, moments: Sums, fitted: Array) -> float:
     spread = np.diagonal(moments.covariance(alone[:4], alone[4]))
     edf = np.maximum(2.0 * model[:, k] ** 2 / spread, 1.0)
     rise = edf / chi2_quantile(0.05, edf) / model[:, k]
-    place = int(np.argmin((model @ fitted) * rise))
-    return float(variance[place] * rise[place])
+    lowest = int(np.argmin((model @ fitted) * rise))
+    return float(variance[lowest] * rise[lowest])
 
 
 class _Curve:
@@ -104,7 +104,7 @@ class _Curve:
         first = mixture.first_guess(variance, moments)
         seeds = [first, *(np.where(np.arange(first.size) == k, 0.0, first) for k in (2, 3, 4) if first[k] > 0.0)]
         tried = [mixture.deviance(variance, moments, everything, self._seeded(seed)) for seed in seeds]
-        self.best, self.strengths = min(tried, key=lambda one: one[0])
+        self.best, self.strengths = min(tried, key=lambda fit: fit[0])
 
     def _seeded(self, start: Array) -> Array:
         return start if np.any(start > 0.0) else 0.3 * self._ceiling

@@ -57,8 +57,8 @@ class Discrimination:
 
     def objective(self, matrix: Array) -> Array:
         """The function that an exchange minimises: −log of the smallest χ², plus a small weight of the others."""
-        own = -np.log(self.separations(matrix))
-        return own.max(axis=-1) + _OTHERS * own.mean(axis=-1)
+        costs = -np.log(self.separations(matrix))
+        return costs.max(axis=-1) + _OTHERS * costs.mean(axis=-1)
 
     def _remaining_chi_square(self, matrix: Array, true: int, wrong: int) -> Array:
         """χ² (..., axes) of the true rival after a fit of the base model and the wrong rival."""

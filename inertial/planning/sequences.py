@@ -181,9 +181,9 @@ def extended(
     middle = T_REFERENCE if last is None else float(np.mean(last))
     apart = np.zeros(batch) if last is None else last - middle
     there = pace.start or standing(state)
-    own = _own_heat(state)
-    ran = timeline(steps, pace, there, middle - own if pace.start is None else pace.start.temperature)
-    apart = apart + own
+    self_heating = _own_heat(state)
+    ran = timeline(steps, pace, there, middle - self_heating if pace.start is None else pace.start.temperature)
+    apart = apart + self_heating
     outer, inner = np.array([s.outer for s in steps]), np.array([s.inner for s in steps])
     scale = float(np.mean(np.linalg.norm(state.force, axis=-1)))
     force = np.broadcast_to(scale * frames.force_from_angles(outer, inner), (*wide, 3))

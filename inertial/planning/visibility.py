@@ -180,10 +180,10 @@ def _after(span: Array, columns: Array, start: Array) -> Array:
     return _beyond(_basis(_beyond(span, start), 1e-9), remainder) if start.shape[-1] else remainder
 
 
-def _better(one: _Remainder, other: _Remainder) -> _Remainder:
+def _better(first: _Remainder, second: _Remainder) -> _Remainder:
     """The larger remaining fraction of two nonlinear values, with the columns of the one with the lower floor."""
-    more = one if one.remaining_fraction >= other.remaining_fraction else other
-    clearer = max((one, other), key=lambda r: float(np.max(np.linalg.norm(r.columns, axis=-2))))
+    more = first if first.remaining_fraction >= second.remaining_fraction else second
+    clearer = max((first, second), key=lambda r: float(np.max(np.linalg.norm(r.columns, axis=-2))))
     return _Remainder(more.remaining_fraction, more.by_axis, clearer.columns, clearer.before)
 
 
@@ -239,8 +239,8 @@ def alias_cosines(seen: Mapping[str, _Remainder]) -> dict[str, dict[str, float]]
     return {name: {o: _inside(spans[name], spans[o]) for o in spans if o != name} for name in spans}
 
 
-def _inside(one: Array, other: Array) -> float:
+def _inside(directions: Array, span: Array) -> float:
     """Smallest cosine of a direction of one effect with the other's span, over the axes where it is visible."""
-    inner = np.linalg.norm(np.swapaxes(other, -1, -2) @ one, axis=-2)
-    there = np.linalg.norm(one, axis=-2) > 0.5
+    inner = np.linalg.norm(np.swapaxes(span, -1, -2) @ directions, axis=-2)
+    there = np.linalg.norm(directions, axis=-2) > 0.5
     return float(np.min(inner[there], initial=1.0)) if there.any() else 0.0

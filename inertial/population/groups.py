@@ -58,22 +58,22 @@ def groups_of(family: Family, values: Array, covariance: Array, lot: Index, grou
     for k, name in enumerate(group):
         if name:
             lots.setdefault(name, {}).setdefault(int(lot[k]), []).append(k)
-    crossed = [list(own.values()) for own in lots.values() if len(own) > 1]
+    crossed = [list(of_lots.values()) for of_lots in lots.values() if len(of_lots) > 1]
     if len(crossed) < p + SPARE:
         raise NotIdentified(
             f"prior: {number_of(len(crossed), 'group')} of the attribute with units in more than one lot, {p + SPARE} are needed "
             "to tell groups from lots; leave 'attribute' out of [prior]"
         )
-    products = np.stack([_between_lots([apart[own].mean(axis=0) for own in each]) for each in crossed])
+    products = np.stack([_between_lots([apart[units].mean(axis=0) for units in each]) for each in crossed])
     # less a standard error: too large a share of the groups would make the prior of a unit too narrow
     mean, error = products.mean(axis=0), products.std(axis=0, ddof=1) / np.sqrt(len(products))
     spread = _within_limits(mean - error * np.eye(p), family.within + family.between)
     shift, left = dict[str, Array](), dict[str, Array]()
-    for name, own in lots.items():
+    for name, of_lots in lots.items():
         information, pull = np.zeros_like(spread), np.zeros_like(family.mean)
-        for units in own.values():
-            one = (family.within + covariance[units].mean(axis=0)) / len(units) + family.between
-            weight = np.linalg.inv(one)
+        for units in of_lots.values():
+            variance = (family.within + covariance[units].mean(axis=0)) / len(units) + family.between
+            weight = np.linalg.inv(variance)
             information += weight
             pull += np.einsum("aij,aj->ai", weight, apart[units].mean(axis=0))
         # W may have no inverse: (W⁻¹ + I)⁻¹ = W − W·(W + I⁻¹)⁻¹·W

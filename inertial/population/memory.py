@@ -46,8 +46,8 @@ def memory_of(values: Array) -> float:
     k = np.arange(FEWEST, n - FEWEST + 1)
     before = np.cumsum(values)[k - 1]
     apart = np.abs((values.sum() - before) / (n - k) - before / k) * np.sqrt(k * (n - k) / n)
-    place = int(k[np.argmax(apart)])
-    left = np.concatenate([values[:place] - values[:place].mean(), values[place:] - values[place:].mean()])
+    cut = int(k[np.argmax(apart)])
+    left = np.concatenate([values[:cut] - values[:cut].mean(), values[cut:] - values[cut:].mean()])
     raw = _neighbours(left)
     steps = np.diff(values)
     most = 1.0 + 2.0 * _neighbours(steps - steps.mean()) + 3.0 / np.sqrt(n)

@@ -72,10 +72,10 @@ def common_evidence(columns: Array, changes: Array, left: Array, covariance: Arr
         for axis in range(columns.shape[1]):
             white = whitener(covariance[unit, axis])
             base, _ = np.linalg.qr(white @ columns[unit, axis])
-            own = white @ changes[unit, :, axis, :]
-            own = own - base @ (base.T @ own)
-            information += own.T @ own
-            projection += own.T @ (white @ left[unit, :, axis])
+            change = white @ changes[unit, :, axis, :]
+            change = change - base @ (base.T @ change)
+            information += change.T @ change
+            projection += change.T @ (white @ left[unit, :, axis])
     return CommonEvidence(information, projection)
 
 
@@ -84,8 +84,8 @@ def without(evidence: CommonEvidence, places: Places) -> CommonEvidence:
     if not places.size:
         return evidence
     kept = np.setdiff1d(np.arange(evidence.projection.size), places)
-    own = np.linalg.pinv(evidence.information[np.ix_(places, places)], hermitian=True)
-    turn = evidence.information[np.ix_(kept, places)] @ own
+    inverse = np.linalg.pinv(evidence.information[np.ix_(places, places)], hermitian=True)
+    turn = evidence.information[np.ix_(kept, places)] @ inverse
     information = evidence.information[np.ix_(kept, kept)] - turn @ evidence.information[np.ix_(places, kept)]
     return CommonEvidence(information, evidence.projection[kept] - turn @ evidence.projection[places])
 
@@ -106,9 +106,9 @@ def sizes(
     total = np.eye(len(value)) + scaled @ scaled.T
     out = []
     for name, places in groups.items():
-        own = columns[:, places]
-        if name not in (known or {}) and np.sum(own**2) > LEAST_INFORMATION:
-            out.append((name, *_parts(total - scaled[:, places] @ scaled[:, places].T, own, value)))
+        of_group = columns[:, places]
+        if name not in (known or {}) and np.sum(of_group**2) > LEAST_INFORMATION:
+            out.append((name, *_parts(total - scaled[:, places] @ scaled[:, places].T, of_group, value)))
     return [_size(name, strength, part, LEVEL / len(out)) for name, strength, part in out]
 
 
@@ -123,17 +123,17 @@ def contradictions(evidence: CommonEvidence, groups: Mapping[str, Places], looke
     looked : the :func:`sizes`
     """
     found: list[Size] = []
-    while larger := [one for one in looked if probability(looked, one) < LEVEL and one.factor > 1.0]:
-        best = max(larger, key=lambda one: one.gain)
-        rivals = tuple(one.name for one in larger if one is not best and one.gain > best.gain - RIVAL)
+    while larger := [size for size in looked if probability(looked, size) < LEVEL and size.factor > 1.0]:
+        best = max(larger, key=lambda size: size.gain)
+        rivals = tuple(size.name for size in larger if size is not best and size.gain > best.gain - RIVAL)
         found.append(replace(best, rivals=rivals))
-        looked = sizes(evidence, groups, {one.name: one.factor for one in found})
+        looked = sizes(evidence, groups, {size.name: size.factor for size in found})
     return found
 
 
-def probability(looked: Sequence[Size], own: Size | None = None) -> float:
+def probability(looked: Sequence[Size], named: Size | None = None) -> float:
     """Probability that an honest lot shows one of the groups so much larger than stated, the most striking or its own."""
-    least = min((one.p_value for one in looked), default=1.0) if own is None else own.p_value
+    least = min((size.p_value for size in looked), default=1.0) if named is None else named.p_value
     return min(1.0, len(looked) * least)
 
 
@@ -141,8 +141,8 @@ def beyond(evidence: CommonEvidence, places: Places, groups: Mapping[str, Places
     """Probability of the residual along some influences that are taken to be zero, groups being as large as they were found."""
     columns, value = _independent(evidence)
     rest = columns.copy()
-    for one in found:
-        rest[:, groups[one.name]] *= one.factor
+    for size in found:
+        rest[:, groups[size.name]] *= size.factor
     rest = np.delete(rest, places, axis=1)
     strength, part = _parts(np.eye(len(value)) + rest @ rest.T, columns[:, places], value)
     return _above(float(np.sum(strength * part**2)), strength)
@@ -156,10 +156,10 @@ def _independent(evidence: CommonEvidence) -> tuple[Array, Array]:
     return root[:, None] * vectors[:, kept].T, vectors[:, kept].T @ evidence.projection / root
 
 
-def _parts(rest: Array, own: Array, value: Array) -> tuple[Array, Array]:
+def _parts(rest: Array, group: Array, value: Array) -> tuple[Array, Array]:
     """Variances κ of a group in directions in which all else has variance one, and the value in these directions."""
     white = whitener(rest)
-    vectors, strength, _ = np.linalg.svd(white @ own, full_matrices=False)
+    vectors, strength, _ = np.linalg.svd(white @ group, full_matrices=False)
     return strength**2, vectors.T @ (white @ value)
 
 

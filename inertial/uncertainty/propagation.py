@@ -124,8 +124,8 @@ class Propagated:
 
     def _inverse(self) -> Array:
         """K⁻¹ of the axes with an output, (..., m, m), g per unit of the output."""
-        own = of_axes(of_axes(self.response, self.axes, -1), self.axes, -2)
-        return np.asarray(np.linalg.inv(own), dtype=np.float64)
+        response = of_axes(of_axes(self.response, self.axes, -1), self.axes, -2)
+        return np.asarray(np.linalg.inv(response), dtype=np.float64)
 
     def covariance(self) -> Array:
         """Covariance of the coefficients of all axes in one vector, (..., 3p, 3p)."""

@@ -18,26 +18,26 @@ def rounded(value: float, expanded: float) -> tuple[str, str]:
     if not expanded > 0.0:
         return f"{value:.4g}", "0"
     u = Decimal(repr(float(expanded)))
-    place = u.adjusted() - 1
-    shown = _to(u, place)
+    exponent = u.adjusted() - 1
+    shown = _to(u, exponent)
     if shown < u * Decimal("0.95"):
-        shown = u.quantize(Decimal(1).scaleb(place), rounding=ROUND_CEILING)
-    if shown.adjusted() - 1 > place:
-        place = shown.adjusted() - 1
-        shown = _to(shown, place)
-    number = _to(Decimal(repr(float(value))), place)
+        shown = u.quantize(Decimal(1).scaleb(exponent), rounding=ROUND_CEILING)
+    if shown.adjusted() - 1 > exponent:
+        exponent = shown.adjusted() - 1
+        shown = _to(shown, exponent)
+    number = _to(Decimal(repr(float(value))), exponent)
     if number == 0:
         number = abs(number)
-    return _text(number, place), _text(shown, place)
+    return _text(number, exponent), _text(shown, exponent)
 
 
-def _to(number: Decimal, place: int) -> Decimal:
-    step = Decimal(1).scaleb(place)
+def _to(number: Decimal, exponent: int) -> Decimal:
+    step = Decimal(1).scaleb(exponent)
     return (number / step).quantize(Decimal(1), rounding=ROUND_HALF_UP) * step
 
 
-def _text(number: Decimal, place: int) -> str:
-    return f"{number:.{max(-place, 0)}f}"
+def _text(number: Decimal, exponent: int) -> str:
+    return f"{number:.{max(-exponent, 0)}f}"
 
 
 LEAST_P = 1e-3
