@@ -116,7 +116,7 @@ def _divided(sums: Array, n: int, most: int, shortest: int, penalty: float) -> l
 
 
 def _best(sums: Array, a: int, b: int, shortest: int) -> tuple[float, int]:
-    """Squares that the best division of a piece explains, and its place; the piece's beginning where there is none."""
+    """Squares that the best division of a piece explains, and the index where it divides; the beginning where there is none."""
     if b - a < 2 * shortest:
         return 0.0, a
     places = np.arange(a + shortest, b - shortest + 1)

@@ -199,7 +199,7 @@ def _jumps(record: Array) -> list[Disturbance]:
 
 
 def _changes(sums: Array, at: Index, span: int) -> Array:
-    """Mean of ``span`` samples from each place on, less that of as many before it."""
+    """Mean of ``span`` samples from each index on, less that of as many before it."""
     return (sums[at + span] - 2.0 * sums[at] + sums[at - span]) / span
 
 

@@ -62,7 +62,7 @@ class Quantity:
     lowest, highest : where values of the column can lie; anything else in a file is a slip
     usual, spread : a value that a plan may take for granted, and how far it wanders about it on a station
     varied : how a plan varies it that leaves it to the station; None where its steps set it
-    reading : place among the columns that every station reads beside its records; 0 where not every station does
+    reading : position among the columns that every station reads beside its records; 0 where not every station does
     """
 
     column: str

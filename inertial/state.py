@@ -247,7 +247,7 @@ def _at_dwells(grid: Array, values: Array, time: Array) -> Array:
     if len(grid) < 2 or not np.array_equal(flat_time, np.broadcast_to(flat_time[:1], flat_time.shape)):
         picked = np.array([np.interp(t, grid, v) for t, v in zip(flat_time, flat_values, strict=True)])
     else:
-        # units read at the same times share the places on the grid; the numbers are those of np.interp
+        # units read at the same times share the intervals of the grid; the numbers are those of np.interp
         at = np.clip(flat_time[0], grid[0], grid[-1])
         lower = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
         below = flat_values[:, lower]

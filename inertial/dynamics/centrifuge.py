@@ -88,7 +88,7 @@ def linearity_error(polynomial: Polynomial, full_scale_g: float) -> float:
     """Standard uncertainty of the linearity by the least-squares line, % of the one-sided range.
 
     The deviation is linear in the coefficients, whose errors are correlated: over one set of speeds the terms are nearly of one
-    shape, and errors of one are made up for by the others. At the place of the largest deviation it is √(dᵀCd).
+    shape, and errors of one are made up for by the others. Where the deviation is largest it is √(dᵀCd).
     """
     x = np.linspace(-full_scale_g, full_scale_g, 2001)
     each = _apart(x, columns(x, polynomial.names))

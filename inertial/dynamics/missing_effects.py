@@ -87,7 +87,7 @@ class Judged(Generic[AnyFit]):
     """The verdict on a model of a test.
 
     adequate : None where it cannot be judged, with ``reason``
-    fit : of the judged model; extended : with one effect of each class, the same where none is named
+    fit : of the judged model; extended : with one effect of each class, equal to ``fit`` where none is named
     classes : effects that make the model adequate, one class after the other
     alone : points that depart alone, where that is more likely than any effect; ``extended`` and ``classes`` are without them
     left_out : rms weighted residual of left-out points before and after; near 1 for a right model
@@ -117,7 +117,7 @@ class BadPoint(Generic[AnyFit]):
     """A point that departs alone, as a cause of a misfit.
 
     without : the fit of the same model without the point that departs most, and which that is
-    located : effects that may sit at any point, as a mode does: beside a bad point they pay for their place, too
+    located : effects that may sit at any point, as a mode does: beside a bad point their price includes this choice, too
     """
 
     without: Callable[[AnyFit], tuple[AnyFit, int]]
@@ -213,7 +213,7 @@ def _bad(
 def _departs_alone(fit: Fitted, rest: Fitted, rival: Fitted, price: float, *, sought: bool) -> bool:
     """Whether a point, the worst of all, departs by more than the scatter of the rest, and more likely than by an effect.
 
-    ``rival``: fit with the best effect. The point is one of many; so is the place of an effect that was ``sought`` among them.
+    ``rival``: fit with the best effect. The point is chosen among many; so is that of an effect which was ``sought`` among them.
     """
     values = fit.dof - rest.dof  # of the point
     if values <= 0:

@@ -189,7 +189,7 @@ def span(y: Array, top: int, level: float) -> tuple[int, int]:
 
 
 def _crossings(y: Array, top: int, level: float) -> tuple[float, float]:
-    """Interpolated places where the pulse crosses a level before and after ``top``, in samples."""
+    """Interpolated times, in samples, at which the pulse crosses a level before and after ``top``."""
     low, high = span(y, top, level)
     start, stop = float(low), float(high)
     if low > 0 and y[low] > y[low - 1]:

@@ -88,7 +88,7 @@ def largest_departure(supply: Array, departure: Array, own_error: Array) -> tupl
 
     Parameters
     ----------
-    supply, departure : (n,), that of the first supply is 0; own : (n,), standard uncertainties without the first one's share
+    supply, departure : (n,), that of the first supply is 0; own_error : (n,), standard uncertainties without that of the first
     """
     step, enough = supply - supply[0], len(supply) >= FEWEST_OF_PARABOLA
     line = _curve(supply, departure, own_error, 1)

@@ -139,7 +139,7 @@ class RotationModel:
         return names, columns, self.data.white_rows(columns)
 
     def _each_axis(self, name: str, term: Array) -> tuple[list[str], Array]:
-        """Columns (n, axes, axes) of a term (n, axes) with a coefficient of its own on each axis."""
+        """Columns (n, axes, axes) of a term (n, axes) with one coefficient for each axis."""
         letters = self.data.letters
         return [f"{name}_{a}" for a in letters], term[:, :, None] * np.eye(len(letters))
 

@@ -152,7 +152,7 @@ def _judged(points: Points, effects: Sequence[str]) -> Judged[TransferFit]:
 
 
 def _rivals(points: Points, extended: TransferFit, classes: Sequence[EffectClass]) -> tuple[TransferFit, ...]:
-    """Models that the points do not exclude in place of the extended one.
+    """Models other than the extended one that the points do not exclude.
 
     A model that describes the points is not the only one: up to 1 kHz a sprung mass of 2.5 kHz with a low-pass of 1.6 kHz looks
     like one of 1.5 kHz with a delay.

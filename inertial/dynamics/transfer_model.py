@@ -268,7 +268,7 @@ def _after_a_step(residual: Callable[[Array], Array], start: Array) -> float:
 
 
 def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:
-    """The solution in which sprung mass and two-pole low-pass change places; None where the model has not both.
+    """The solution with sprung mass and two-pole low-pass exchanged; None where the model has not both.
 
     At ζ near 0.7071 both are alike, and a sweep hardly tells which of them is the mass.
     """

@@ -20,7 +20,7 @@ from inertial.noise.gauss_markov import BiasModel, StepOfProcess, step_of_proces
 
 AXES = 3
 GATE_SIGMA = 5.0
-_MOST_STEPS = 64  # of different lengths whose transitions are kept
+_MOST_STEPS = 64  # of different lengths whose transitions are stored
 _FEWEST = 8  # updates that are needed to judge their consistency
 
 
@@ -219,7 +219,7 @@ def consistency(innovations: list[tuple[int, float]]) -> Consistency:
 class Track:
     """Bias (n, 3) in g after each step, a mean over the step, its covariance (n, 3, 3) in g², and which steps updated it (n,).
 
-    expected, expected_covariance : the same before the update of the step, as known to a filter in real time
+    expected, expected_covariance : the estimate before the update of the step, as known to a filter in real time
     """
 
     bias: Array
@@ -249,7 +249,7 @@ def track(
     force : (n, 3), g, corrected output, means over steps of ``seconds``
     known : (n, 3), g, true force; NaN where it is not known
     magnitude : (n,), g, its magnitude where that alone is known; NaN elsewhere
-    begin : a state to go on with, and its time, s: the middle of the step after which it was kept
+    begin : a state to go on with, and its time, s: the middle of the step after which it was stored
     """
     tracker = BiasFilter(model, begin=None if begin is None else begin[0])
     n = len(time)

@@ -87,7 +87,7 @@ def walk_mean(time: Array, since: _Time, start: _Time, length: _Time) -> tuple[A
 
 
 def flicker_mean(time: Array, constants: Array, start: float, length: float) -> tuple[Array, float]:
-    """The same for a sum of Ornstein–Uhlenbeck processes of equal variance, in total one, at times inside the window.
+    """As :func:`walk_mean`, of a sum of Ornstein–Uhlenbeck processes of equal variance, in total one, at times in the window.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ _NEGLIGIBLE = 1e-6
 _WIDEST = 40.0  # natural logarithm: how far above a strength its upper limit is looked for
 _RESOLUTION = 2e-3  # of an end of an interval, relative
 _STEP = 0.7  # of the natural logarithm, on the way to a lower end
-_ROUGH = 0.02  # the same where each look takes the covariance anew
+_ROUGH = 0.02  # the resolution where each look takes the covariance anew
 
 
 class TermFit(NamedTuple):

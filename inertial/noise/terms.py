@@ -1,6 +1,6 @@
 """Noise coefficients Q, N, B, K, R under an Allan curve, fitted together, each with an interval or an upper limit.
 
-For a filter, a term that the curve does not identify has its likeliest strength. An upper limit in place of a value is right
+For a filter, a term that the curve does not identify has its likeliest strength. An upper limit instead of a value is right
 where somebody asks how large a term may be. In a filter it is not: the limits of N, B and K cannot hold all at once, and the
 limit of K from a record of half an hour is ten times the usual K, so that a filter stated five times the true deviation after an
 hour without an update.

@@ -1,6 +1,6 @@
 """T-criterion: how well a plan discriminates between rival effects, from the normal matrix of the model with all of them.
 
-Each rival in turn is taken as the truth, with coefficients of a given size; the model with another rival in its place is fitted
+Each rival in turn is taken as the truth, with coefficients of a given size; the model with another rival instead is fitted
 to the predicted data. The remaining χ² is the noncentrality of the test between the two; a T-optimal plan maximises the
 smallest of them.
 

@@ -9,7 +9,9 @@ from inertial.arrays import Array
 from inertial.population.memory import TO_SIGMA, drawn_in, innovations, memories_of, memory_of
 
 FEWEST = 4  # points on either side
-LIKELY = 7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the place lies with 95 % (Hansen 2000, table 1)
+LIKELY = (
+    7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the change lies with 95 % (Hansen 2000, table 1)
+)
 DRAWN_IN = 4.0
 DOF_OF_DIFFERENCES = 1.3
 PLACES, GROWTH = 0.65, 0.68
@@ -136,7 +138,7 @@ def _p_value(statistic: float, n: int, noise: _Noise) -> float:
 
 
 def _described(values: Array, offset: int, cut: int, noise: _Noise) -> ChangePoint:
-    """The change at a place of a part of a series."""
+    """The change before the value number ``cut`` of a part of a series, which begins at ``offset`` in it."""
     statistic = _statistic(values) / noise.sigma
     best = statistic[cut - 1]
     likely = np.flatnonzero(best**2 - statistic**2 <= LIKELY) + 1

@@ -36,7 +36,7 @@ def drawn_in(values: Array) -> Array:
 def memory_of(values: Array) -> float:
     """Correlation of neighbours of a series (n,) whose level may change, from 0 to 0.9.
 
-    From what one change of level, at its best place, leaves (corrected for its bias of (1 + 4ρ)/n: M. G. Kendall, Biometrika 41
+    From what the best change of level leaves (corrected for its bias of (1 + 4ρ)/n: M. G. Kendall, Biometrika 41
     (1954) 403), and no more than the differences of neighbours allow, which no change of level enters: their own correlation is
     −(1 − ρ)/2.
     """
@@ -73,7 +73,7 @@ def innovations(values: Array, memory: float) -> Array:
 def _running_median(values: Array) -> Array:
     """Running median (n,), the series mirrored at its ends.
 
-    With the end value itself repeated it would be its own median: a wild first value then stood for a level of its own.
+    With the end value itself repeated it would be its own median: a wild first value would then count as a level.
     """
     return median_filter(values, LOCAL, mode="mirror")
 

@@ -26,7 +26,7 @@ TOLD = 0.9
 FACTORS = np.geomspace(0.02, 200.0, 800)
 """Sizes over the stated one that are looked at; neighbours differ by 1.2 %."""
 LEAST_INFORMATION = 1e-6
-"""Of a direction that is kept: below it, the stated errors move the lot by a thousandth of its noise."""
+"""Least information of a direction that counts: below it, the stated errors move the lot by a thousandth of its noise."""
 HALF_CHI2_95 = 1.9207
 RIVAL = 2.0  # difference of log likelihood up to which two contributions are not told apart: a ratio of seven
 
@@ -132,7 +132,7 @@ def contradictions(evidence: CommonEvidence, groups: Mapping[str, Places], looke
 
 
 def probability(looked: Sequence[Size], named: Size | None = None) -> float:
-    """Probability that an honest lot shows one of the groups so much larger than stated, the most striking or its own."""
+    """Probability that an honest lot shows one of the groups so much larger than stated: the most striking, or a named one."""
     least = min((size.p_value for size in looked), default=1.0) if named is None else named.p_value
     return min(1.0, len(looked) * least)
 

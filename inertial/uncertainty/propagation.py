@@ -23,7 +23,7 @@ class FitDesign:
 
     columns : (..., 3, n, p), H; gain : (..., 3, p, n), G; names : per axis, (effect id, coefficient) of the p columns
     shared : (..., 3, n, s), columns of parameters that the lot shares; none where s = 0
-    whitening : (n, n), root of the weights; axes : the m axes with an output, in the place of three
+    whitening : (n, n), root of the weights; axes : the m axes with an output, of x, y, z
     """
 
     columns: Array
@@ -113,7 +113,7 @@ class Propagated:
 
     coefficients : (..., 3, p, q); names : per axis, (effect id, coefficient)
     source : the influences, of the same q columns
-    axes : the m axes with an output, in the place of three
+    axes : the m axes with an output, of x, y, z
     """
 
     coefficients: Array
