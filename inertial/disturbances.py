@@ -141,7 +141,7 @@ def _loud(quick: Array) -> Flags:
     return loud
 
 
-def _brief(quick: Array, whole: float) -> list[Disturbance]:
+def _brief(quick: Array, total: float) -> list[Disturbance]:
     """Short bursts that come again, as one disturbance, from a record's quick part (n,) without what is told otherwise.
 
     The cube root of a mean square is nearly normal (Wilson and Hilferty), so that its own spread over the record tells what is
@@ -149,7 +149,7 @@ def _brief(quick: Array, whole: float) -> list[Disturbance]:
 
     Parameters
     ----------
-    whole : sum of the squares of the record's noise
+    total : sum of the squares of the record's noise
     """
     inside: Flags = np.zeros(quick.size, dtype=bool)
     most = CAPPED * _spread(quick)
@@ -168,7 +168,7 @@ def _brief(quick: Array, whole: float) -> list[Disturbance]:
     if np.count_nonzero(apart) < FEWEST_BURSTS:
         return []
     largest = float(quick[inside][np.argmax(np.abs(quick[inside]))])
-    material = float(np.sum(quick[inside] ** 2)) > MATERIAL * whole
+    material = float(np.sum(quick[inside] ** 2)) > MATERIAL * total
     return [Disturbance("bursts", int(starts[0]), int(stops[-1]), int(np.count_nonzero(apart)), largest, material)]
 
 
@@ -208,5 +208,5 @@ def _sharp(sums: Array, sample: int, span: int, size: float, spread: float) -> b
     wide = min(4 * span, sample, sums.size - 1 - sample)
     if wide < 2 * span:
         return False
-    whole = float(_changes(sums, np.array([sample]), wide)[0])
-    return abs(whole) < SHARP * abs(size) * (wide / span) / 4.0 + 3.0 * spread
+    change = float(_changes(sums, np.array([sample]), wide)[0])
+    return abs(change) < SHARP * abs(size) * (wide / span) / 4.0 + 3.0 * spread

@@ -226,8 +226,8 @@ class _Work:
                 SolvedNorms(every[unit], left[unit], noise.weight, noise.whiten[unit], 1.0) for noise in plausible
             ]
             noises = noises or [SolvedNorms(every[unit], left[unit], 1.0, self.whiten[unit])]
-            whole = np.sum([noise.weight * noise.covariance(int(dof[unit])) for noise in noises], axis=0)
-            together[unit] = whole[:free, :free]
+            joint = np.sum([noise.weight * noise.covariance(int(dof[unit])) for noise in noises], axis=0)
+            together[unit] = joint[:free, :free]
             if record is not None:
                 share = used[unit] * (1.0 if weights is None else np.nan_to_num(weights[unit]))
                 share = share if share.sum() > 0.0 else used[unit].astype(np.float64)
@@ -243,8 +243,8 @@ class _Work:
                 record[unit] = np.sqrt(np.sum(square, axis=0))
             for axis in range(3):
                 mine = np.flatnonzero(indices[:, 0] == axis)
-                covariance[unit, axis][np.ix_(indices[mine, 1], indices[mine, 1])] = whole[np.ix_(mine, mine)]
-            nonlinear[unit] = np.sqrt(np.maximum(np.diagonal(whole)[free:], 0.0))
+                covariance[unit, axis][np.ix_(indices[mine, 1], indices[mine, 1])] = joint[np.ix_(mine, mine)]
+            nonlinear[unit] = np.sqrt(np.maximum(np.diagonal(joint)[free:], 0.0))
         errors: dict[str, dict[str, float]] = {}
         for k, (effect, name) in enumerate(self.parameters()):
             errors.setdefault(effect, {})[name] = float(nonlinear[:, k].max())

@@ -84,8 +84,8 @@ def _own_part(space: Space, candidate: Candidate, point: int, common: float, axe
     inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=1e-4, hermitian=True)
     fitted = columns @ (inverse @ (np.swapaxes(columns, -1, -2) @ space.residual[..., None]))
     fitted = fitted[..., 0].reshape(units, axes, -1)
-    whole = max(float(np.sum(fitted**2)), 1e-300)
-    return 1.0 - float(units * np.sum(fitted.mean(axis=0) ** 2) / whole) * (1.0 - 1.0 / common)
+    total = max(float(np.sum(fitted**2)), 1e-300)
+    return 1.0 - float(units * np.sum(fitted.mean(axis=0) ** 2) / total) * (1.0 - 1.0 / common)
 
 
 def _everything(field: Candidates, drivers: list[Driver]) -> Iterator[Candidate]:

@@ -35,12 +35,12 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
     best = next(iter(contest(field, base)), None)
     if best is None or not convincing(field, base, best):
         return found
-    kept = bad_dwells(base.with_term(best.term))
-    indices = {d.index for d in kept}
+    beside_effect = bad_dwells(base.with_term(best.term))
+    indices = {d.index for d in beside_effect}
     explained = [d for d in found if d.index not in indices]
     if not explained or -best.cost <= sum(_score(base, d) for d in explained):
         return found
-    return kept if len(explained) > 1 or _seen_without(base, rivals, best.term, explained) else found
+    return beside_effect if len(explained) > 1 or _seen_without(base, rivals, best.term, explained) else found
 
 
 def _seen_without(base: Model, effects: list[AnyEffect], term: Term, bad: list[BadDwell]) -> bool:

@@ -95,9 +95,9 @@ def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
     flat = candidate.of_blocks[:, :, 0, :]
     blocks, n = flat.shape[:2]
     white = space.whiten(flat)
-    whole, white, free = (a.reshape(blocks, n, ways, -1) for a in (flat, white, space.project(white)))
+    columns, white, free = (a.reshape(blocks, n, ways, -1) for a in (flat, white, space.project(white)))
     even = _evened(np.einsum("bnwp,bnwr->pr", free, free), np.sqrt(np.einsum("bnwp,bnwp->p", white, white)))
-    whole = whole @ even
+    columns = columns @ even
     free = (free @ even).reshape(blocks, n, -1)
     gram = np.swapaxes(free, -1, -2) @ free
     right = np.einsum("bnq,bn->bq", free, space.residual)
@@ -112,7 +112,7 @@ def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
         together = np.einsum("bw,bwpvr,bv->pr", size, gram, size) + 1e-9 * np.eye(count)
         shape = np.linalg.solve(together, np.einsum("bw,bwp->p", size, right))
         shape /= max(float(np.linalg.norm(shape)), 1e-300)
-    return whole @ shape, blocks * ways + count - 1
+    return columns @ shape, blocks * ways + count - 1
 
 
 def _evened(gram: Array, size: Array) -> Array:

@@ -145,12 +145,12 @@ def examined(
         if of_all and not any_of_all(run.model()):
             break
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
-        whole = Problem(run.lot, slope=searched.base.problem.slope)
-        kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)), of_all=of_all)
-        same = {d.index for d in kept} == {d.index for d in run.removed}
+        problem = Problem(run.lot, slope=searched.base.problem.slope)
+        removed = bad_dwells(replaced(Model(problem, searched.model.terms, near=searched.model.noise)), of_all=of_all)
+        same = {d.index for d in removed} == {d.index for d in run.removed}
         if same and not _placed_again(run, searched.model) and not _dropped(run, searched):
             break
-        run.removed = kept
+        run.removed = removed
         searched = mended(run)
     return run, searched
 
@@ -211,8 +211,8 @@ def mended(run: ExaminedRun) -> EffectSearch:
         if not searched.handling and part.field is not fields:
             part.base.problem.forget()
             part.base.forget()
-            whole = search(fields, base, part.imitates, start=searched.added)
-            searched, of = replace(whole, ladder=searched.ladder), fields
+            result = search(fields, base, part.imitates, start=searched.added)
+            searched, of = replace(result, ladder=searched.ladder), fields
         if part.field is not fields:
             base.forget()
         if not searched.handling or len(run.handled) >= _MENDED:

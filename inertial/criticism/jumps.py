@@ -83,8 +83,8 @@ def _drops(space: Space, candidate: Candidate) -> Array:
     along = np.einsum("bnp,bn->bp", columns, space.residual)
     drops = np.einsum("bp,bpq,bq->b", along, inverse, along)
     # with their coefficients estimated again the effect explains more
-    whole, total = float(space.gain(candidate).drop[0]), max(float(drops.sum()), 1e-300)
-    return drops * max(whole / total, 1.0)
+    together, total = float(space.gain(candidate).drop[0]), max(float(drops.sum()), 1e-300)
+    return drops * max(together / total, 1.0)
 
 
 def _score(drops: Array, rival: Rival, per_unit: int) -> float:

@@ -79,15 +79,15 @@ def left_out(model: Model, judged: Term | None = None, also: Sequence[Term] = ()
     missed: dict[Kind, Array] = {}
     density: dict[Kind, float] = {}
     for kind, fold in _folds(model.problem).items():
-        whole = np.full((model.problem.blocks, model.problem.n), np.nan)
+        residuals = np.full((model.problem.blocks, model.problem.n), np.nan)
         total, sound = 0.0, True
         for k in range(int(fold.max()) + 1):
             out = (fold == k) & ~_alone(begun, fold == k)
             predicted = parts.predicted(out)
             sound &= predicted is not None
             if predicted is not None:
-                whole[:, out], total = predicted[0], total + predicted[1]
-        missed[kind] = whole
+                residuals[:, out], total = predicted[0], total + predicted[1]
+        missed[kind] = residuals
         if sound:
             density[kind] = total
     return LeftOut(missed, density)
@@ -112,15 +112,15 @@ def _without_wander(model: Model, judged: Term | None) -> LeftOut:
     """Poses left out by weighted least squares: for records so long that wander is not modelled."""
     problem = model.problem
     fold = _by_pose(problem)
-    whole = np.full((problem.blocks, problem.n), np.nan)
-    kept = _kept(model, judged)
+    residuals = np.full((problem.blocks, problem.n), np.nan)
+    keeps = _kept(model, judged)
     series = problem.y
-    if kept.any():
-        series = series - model.shared[..., kept] @ model.space.shared_sizes[kept]
+    if keeps.any():
+        series = series - model.shared[..., keeps] @ model.space.shared_sizes[keeps]
     fitting = Fitting(problem, [t for t in model.terms if not _keeps(t, judged)])
     for k in range(int(fold.max()) + 1):
-        whole[:, fold == k] = fitting.left(series[..., None], fold != k)[:, fold == k, 0]
-    return LeftOut({"poses": np.where(np.isfinite(problem.error), whole, np.nan)}, {"poses": 0.0})
+        residuals[:, fold == k] = fitting.left(series[..., None], fold != k)[:, fold == k, 0]
+    return LeftOut({"poses": np.where(np.isfinite(problem.error), residuals, np.nan)}, {"poses": 0.0})
 
 
 def _keeps(term: Term, judged: Term | None) -> bool:
@@ -130,10 +130,10 @@ def _keeps(term: Term, judged: Term | None) -> bool:
 
 def _kept(model: Model, judged: Term | None) -> Flags:
     """The shared columns (q,) of a model that keep their coefficients."""
-    kept = np.zeros(model.shared.shape[-1], dtype=bool)
+    keeps = np.zeros(model.shared.shape[-1], dtype=bool)
     for term, columns in model.slices(shared=True):
-        kept[columns] = _keeps(term, judged)
-    return kept
+        keeps[columns] = _keeps(term, judged)
+    return keeps
 
 
 class _Parts:
@@ -256,8 +256,8 @@ class _Group:
 
         (S − AᵀA)⁻¹ = S⁻¹ + S⁻¹Aᵀ(I − AS⁻¹Aᵀ)⁻¹AS⁻¹: one inverse for all blocks, and a small one for each.
         """
-        whole = self.inverse[np.ix_(dwells, dwells)]
-        values, vectors = np.linalg.eigh(whole)
+        precision = self.inverse[np.ix_(dwells, dwells)]
+        values, vectors = np.linalg.eigh(precision)
         inverse = (vectors / values) @ vectors.T
         rows = self.along[:, :, dwells]
         turned = rows @ inverse
@@ -265,12 +265,12 @@ class _Group:
         remains, directions = np.linalg.eigh(small)
         least = remains.min(initial=1.0)
         if least * values[0] <= _SURELY * values[-1]:
-            exact = np.linalg.eigvalsh(whole - np.swapaxes(rows, -1, -2) @ rows)
+            exact = np.linalg.eigvalsh(precision - np.swapaxes(rows, -1, -2) @ rows)
             if bool(np.any(exact[:, 0] <= _UNDETERMINED * exact[:, -1])):
                 return None
         half = np.swapaxes(directions, -1, -2) @ turned / np.sqrt(remains)[..., None]
         expected = (np.trace(inverse) + np.einsum("brk,brk->b", half, half)) * self.level**2 / dwells.size
-        alone = np.mean(1.0 / np.diagonal(whole)) * self.level**2
+        alone = np.mean(1.0 / np.diagonal(precision)) * self.level**2
         right = np.concatenate([self.py[:, dwells, None], self.pz[:, dwells]], axis=-1)
         solved = inverse @ right + np.swapaxes(half, -1, -2) @ (half @ right)
         solved *= self.level[:, None, None] ** 2

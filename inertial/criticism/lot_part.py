@@ -77,8 +77,8 @@ class LotPart:
         better = better_curve(base, [*held, *further], self.every_suspect)
         if better is None:
             return None
-        fit, kept = better
-        remaining = {t.key for t in kept}
+        fit, terms = better
+        remaining = {t.key for t in terms}
         imitations = frozenset(t.effect.id for t in held if t.key not in remaining)
         return (unexplained_by(base, fit, len(self.every_suspect)), imitations) if imitations else None
 

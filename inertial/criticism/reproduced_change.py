@@ -68,10 +68,10 @@ def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> Reproduced
     lot : the fresh run, in the scale of the first
     before, after : the models without and with the effect, fitted to the first run
     """
-    whole = Model(Problem(lot), after.terms)
-    lot = without(lot, [d.index for d in bad_dwells(whole)])
+    model = Model(Problem(lot), after.terms)
+    lot = without(lot, [d.index for d in bad_dwells(model)])
     problem = Problem(lot)
-    noise = Model(problem, after.terms, near=whole.noise).noise
+    noise = Model(problem, after.terms, near=model.noise).noise
     zero = np.where(np.isfinite(problem.error), 1.0, 0.0)
     left = np.nan_to_num(residuals_of(problem, before))
     change = left - np.nan_to_num(residuals_of(problem, after))

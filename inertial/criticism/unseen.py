@@ -181,9 +181,9 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], effect:
         for space in spaces:
             found = space.products(piece)
             seen = np.diagonal(found.left, axis1=-2, axis2=-1).sum(axis=0)
-            whole = found.squares.sum(axis=0)
-            visible = seen > SEEN**2 * whole
-            share = np.where(visible, seen / np.where(visible, whole, 1.0), 0.0)
+            squares = found.squares.sum(axis=0)
+            visible = seen > SEEN**2 * squares
+            share = np.where(visible, seen / np.where(visible, squares, 1.0), 0.0)
             with np.errstate(over="ignore"):  # an almost invisible column would need an arbitrary size
                 factor = np.sqrt(needed / np.where(visible, seen, 1.0))
             visible &= np.isfinite(factor)

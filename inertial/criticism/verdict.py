@@ -277,8 +277,8 @@ def _curve_in_place_of(
     better = better_curve(part.base, searched.added, suspected) if searched.added else None
     if better is None:
         return None
-    fit, kept = better
-    return Model(base.problem, [*base.terms, *kept]), unexplained_by(part.base, fit, len(suspected))
+    fit, terms = better
+    return Model(base.problem, [*base.terms, *terms]), unexplained_by(part.base, fit, len(suspected))
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:

@@ -85,14 +85,14 @@ class PlainFit:
         changes = self._changes(pair)
         n = self.there.shape[1]
         first, end = np.arange(EDGE, n - EDGE + 1), np.append(np.arange(2 * EDGE, n - EDGE + 1), n)
-        whole = float(np.sum(self.left[pair] ** 2))
-        if whole <= 0.0 or not first.size:
+        total = float(np.sum(self.left[pair] ** 2))
+        if total <= 0.0 or not first.size:
             return []
         lasting = (int(first[np.argmin(_left_by(changes, first, end[-1:])[:, 0])]), n)
         each = [_best_of(changes, first[k : k + _TOGETHER], end) for k in range(0, first.size, _TOGETHER)]
         found: dict[tuple[int, int], float] = {}
         for a, b in {lasting, min(each)[1]}:
-            if whole + float(_left_by(changes, np.array([a]), np.array([b]))[0, 0]) > _LEFT * whole:
+            if total + float(_left_by(changes, np.array([a]), np.array([b]))[0, 0]) > _LEFT * total:
                 continue
             near = [(k, b) for k in range(a - around, a + around + 1)]
             near += [(a, k) for k in range(b - around, b + around + 1) if b < n]

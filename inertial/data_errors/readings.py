@@ -185,7 +185,7 @@ def find_split(force: Array, output: Array) -> Split | None:
     if there.size < 2 * _LEAST + 1:
         return None
     f, y = force[there], output[there]
-    whole = _plain_fit(f, y)[1]
+    total = _plain_fit(f, y)[1]
     places = np.arange(_LEAST, there.size - _LEAST)
     if _far_from_split(f, y, places):
         return None
@@ -197,7 +197,7 @@ def find_split(force: Array, output: Array) -> Split | None:
     best = int(near[int(np.argmin(errors))])
     before, after = _plain_fit(f[:best], y[:best])[0], _plain_fit(f[best:], y[best:])[0]
     apart = float(np.max(np.abs(after - before))) > 0.01 * float(np.sqrt(np.sum(before[1:] ** 2) / before.shape[1]))
-    return Split(int(there[best]), before, after) if min(errors) < _BETTER * whole and apart else None
+    return Split(int(there[best]), before, after) if min(errors) < _BETTER * total and apart else None
 
 
 def _far_from_split(force: Array, output: Array, places: Places) -> bool:

@@ -87,9 +87,9 @@ class _Noise:
         for k in range(len(_SHARES)):
             grid, density, _ = _table(k)
             for j, s in enumerate(scale.tolist()):
-                kept = 1.0 - float(_probability_beyond(k, np.array([below / s]))[0])
+                below_limit = 1.0 - float(_probability_beyond(k, np.array([below / s]))[0])
                 each = np.log(np.maximum(np.interp(inside / s, grid, density), 1e-300))
-                log[k, j] = float(each.sum()) - inside.size * np.log(s * max(kept, 1e-12))
+                log[k, j] = float(each.sum()) - inside.size * np.log(s * max(below_limit, 1e-12))
         prior = np.where(_WEIGHTS > 0.0, TAILS * _WEIGHTS, 1.0 - TAILS)
         weight = np.exp(log - log.max()) * prior[:, None]
         return _Noise(weight / weight.sum(), scale)
@@ -99,10 +99,10 @@ class _Noise:
         length, axes = float(np.linalg.norm(by_axis)), len(by_axis)
         total = 0.0
         for k in range(len(_SHARES)):
-            whole = axes * _probability_beyond(k, length / self.scale)
+            single_axis = axes * _probability_beyond(k, length / self.scale)
             each = np.stack([_probability_beyond(k, abs(float(v)) / self.scale) for v in by_axis])
             together = chi2_tail(-2.0 * np.log(np.maximum(each, 1e-300)).sum(axis=0), 2.0 * axes)
-            least = np.minimum(2.0 * dwells * np.minimum(whole, together), 1.0)
+            least = np.minimum(2.0 * dwells * np.minimum(single_axis, together), 1.0)
             total += float(np.sum(self.weight[k] * least))
         return total
 

@@ -215,8 +215,8 @@ class Evidence:
         """Stations that differ for good: each lot against what its station's earlier ones predict."""
         table = self.levels.setdefault(STATION, Levels(self.count))
         prior, centre = SHRUNK * self._typical, self._centre()
-        (whole,), (behind,) = table.predicted((lot.station,), prior)
-        predicted = whole - centre * over(behind, behind + prior)
+        (of_station,), (behind,) = table.predicted((lot.station,), prior)
+        predicted = of_station - centre * over(behind, behind + prior)
         scale = self._scales["between"]
         left = scale.bounded(np.where(seen, (size - centre) * np.sqrt(safe), 0.0))
         x = left / scale.rms * np.clip(predicted * np.sqrt(safe) / scale.rms, -BOUND, BOUND)

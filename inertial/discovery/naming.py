@@ -125,12 +125,12 @@ class Pool:
             found.append(name)
             lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
         imitations = _imitations(found, of_pose, needed)
-        kept = [name for at, name in enumerate(found) if at not in imitations]
-        if len(kept) < len(found):
+        genuine = [name for at, name in enumerate(found) if at not in imitations]
+        if len(genuine) < len(found):
             lots = every
-            for name in kept:
+            for name in genuine:
                 lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
-        return kept, self._unnamed(lots, kept, drivers, needed)
+        return genuine, self._unnamed(lots, genuine, drivers, needed)
 
     def _unnamed(
         self, lots: Sequence[ScoredLot], names: Sequence[Name], drivers: Sequence[str], needed: float
@@ -166,10 +166,10 @@ class Pool:
         root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
         scale = over(np.ones_like(root), root)
         sizes = scale * (over(centred[:, here], root) @ inner)
-        whole = (scale[:, :, None] * inner * scale[:, None, :]).reshape(
+        covariance = (scale[:, :, None] * inner * scale[:, None, :]).reshape(
             len(root), self.axes, -1, self.axes, here.size // self.axes
         )
-        covariances = np.stack([whole[:, axis, :, axis] for axis in range(self.axes)])
+        covariances = np.stack([covariance[:, axis, :, axis] for axis in range(self.axes)])
         return np.moveaxis(sizes.reshape(len(root), self.axes, -1), 1, 0), covariances
 
     def _in_order(

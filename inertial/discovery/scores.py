@@ -125,9 +125,9 @@ def _scored(
     plain = squares / (covariance.level * even.noise.scale)[:, None] ** 2
     rows = covariance.white_rows(rows, space.noise.shares, every)
     rows /= (covariance.level * space.noise.scale)[:, None, None]
-    whole, score = np.einsum("bkn,bkn->bk", rows, rows), (rows @ space.targets[..., :1])[..., 0]
+    squares_before, score = np.einsum("bkn,bkn->bk", rows, rows), (rows @ space.targets[..., :1])[..., 0]
     rows -= (rows @ space.q) @ np.swapaxes(space.q, -1, -2)
-    visible = np.einsum("bkn,bkn->bk", rows, rows) > SEEN**2 * whole
+    visible = np.einsum("bkn,bkn->bk", rows, rows) > SEEN**2 * squares_before
     rows *= visible[..., None]
     score = score * visible
     of_sensor, of_station = rows[:, :k], rows[:, k:]

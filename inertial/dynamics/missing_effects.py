@@ -186,15 +186,15 @@ def judge_points(count: int, verdict_on: Callable[[Flags], Judged[AnyFit]]) -> t
     count : of points
     verdict_on : the verdict on some of them, which names at most one that departs alone
     """
-    kept = np.ones(count, dtype=bool)
-    first = judged = verdict_on(kept)
+    sound = np.ones(count, dtype=bool)
+    first = judged = verdict_on(sound)
     while judged.alone:
-        kept[np.flatnonzero(kept)[list(judged.alone)]] = False
-        if FEWEST_TO_ONE_ALONE * (count - kept.sum()) > count:  # no single points: all are worse than was stated
+        sound[np.flatnonzero(sound)[list(judged.alone)]] = False
+        if FEWEST_TO_ONE_ALONE * (count - sound.sum()) > count:  # no single points: all are worse than was stated
             return replace(first, alone=()), np.ones(count, dtype=bool)
-        judged = verdict_on(kept)
-    alone = tuple(np.flatnonzero(~kept).tolist())
-    return replace(judged, adequate=first.adequate, fit=first.fit, alone=alone), kept
+        judged = verdict_on(sound)
+    alone = tuple(np.flatnonzero(~sound).tolist())
+    return replace(judged, adequate=first.adequate, fit=first.fit, alone=alone), sound
 
 
 def _score(fit: Fitted, price: float) -> float:

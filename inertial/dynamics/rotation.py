@@ -178,9 +178,9 @@ class RotationModel:
                 names, columns = [f"{effect}_{k}" for k in range(term.shape[-1])], self._seen(term)
             else:
                 names, columns = self._each_axis(effect, term[:, : len(self.data.letters)])
-            kept = np.linalg.norm(columns, axis=(0, 1)) > 1e-9
-            names = [name for name, keep in zip(names, kept, strict=True) if keep]
-            self._columns[effect] = self._whitened(names, columns[..., kept])
+            seen = np.linalg.norm(columns, axis=(0, 1)) > 1e-9
+            names = [name for name, keep in zip(names, seen, strict=True) if keep]
+            self._columns[effect] = self._whitened(names, columns[..., seen])
         return self._columns[effect]
 
     def _system(self, effects: Sequence[str]) -> tuple[list[str], Array, Array, Array]:
@@ -217,12 +217,12 @@ class RotationModel:
                 "rotation: the turns do not tell bias, scale, misalignment and delay apart; turn another plane too"
             )
         left, singular, right = np.linalg.svd(rows / size, full_matrices=False)
-        kept = singular > 1e-6 * singular[0]
-        value = (right[kept].T @ ((left[:, kept].T @ target) / singular[kept])) / size
-        inverse = (right[kept].T / singular[kept] ** 2) @ right[kept] / np.outer(size, size)
+        determined = singular > 1e-6 * singular[0]
+        value = (right[determined].T @ ((left[:, determined].T @ target) / singular[determined])) / size
+        inverse = (right[determined].T / singular[determined] ** 2) @ right[determined] / np.outer(size, size)
         variance, beside, free = self.data.noise_scale
         squares = float(np.sum((target - rows @ value) ** 2)) - beside
-        dof = free + (len(target) - len(self._target)) - int(kept.sum())
+        dof = free + (len(target) - len(self._target)) - int(determined.sum())
         total = len(self._target) - free
         # the noise is estimated too: its own scatter widens χ², so that both laws agree where a model is refused
         wide = float(f.isf(ADEQUATE_P, dof, total) * dof / chi2.isf(ADEQUATE_P, dof))

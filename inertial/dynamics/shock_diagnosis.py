@@ -80,13 +80,13 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags]
         raise NotIdentified(
             f"shock: {count} samples for {len(effects) + len(parameters) + 1} parameters; record faster"
         )
-    whole = np.concatenate(used)
-    target = np.concatenate([shock.unit / shock.error for shock in record.shocks])[whole]
+    counted = np.concatenate(used)
+    target = np.concatenate([shock.unit / shock.error for shock in record.shocks])[counted]
     model = Design(record, effects, parameters)
     coordinates = model.coordinates
 
     def design(x: Array) -> Array:
-        return model.at(x)[whole]
+        return model.at(x)[counted]
 
     def solved(x: Array) -> tuple[Array, Array]:
         columns = design(x)

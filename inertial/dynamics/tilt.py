@@ -125,17 +125,17 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time
         raise NotIdentified(
             f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
         )
-    whole = np.diag(error**2)
+    noise_covariance = np.diag(error**2)
     if time is not None:
         kernel = flicker_kernel(time)
-        whole = whole + wander(rows, output, whole, kernel).variance * kernel
-    root = np.linalg.cholesky(whole)
+        noise_covariance = noise_covariance + wander(rows, output, noise_covariance, kernel).variance * kernel
+    root = np.linalg.cholesky(noise_covariance)
     white_rows, white_output = np.linalg.solve(root, rows), np.linalg.solve(root, output)
     c = np.linalg.lstsq(white_rows, white_output, rcond=None)[0]
     covariance = np.asarray(np.linalg.inv(white_rows.T @ white_rows), dtype=np.float64)
     weights = np.asarray(np.linalg.solve(root.T, white_rows @ covariance).T, dtype=np.float64)
     left = np.eye(len(angle)) - rows @ weights
-    spread = np.sqrt(np.einsum("ij,jk,ik->i", left, whole, left))
+    spread = np.sqrt(np.einsum("ij,jk,ik->i", left, noise_covariance, left))
     return TiltFit(names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle, weights, spread)
 
 

@@ -103,8 +103,8 @@ def diagnose_transfer(
     effects : of the model to judge
     highest_hz : to which the exciter reaches, for the next frequencies; the points' highest where None
     """
-    judged, kept = judge_points(len(points.value), lambda kept: _judged(points.picked(kept), effects))
-    rest, alone = points.picked(kept), tuple(sorted(points.conditions.frequency[~kept].tolist()))
+    judged, sound = judge_points(len(points.value), lambda sound: _judged(points.picked(sound), effects))
+    rest, alone = points.picked(sound), tuple(sorted(points.conditions.frequency[~sound].tolist()))
     top = float(points.conditions.frequency.max())
     open_end = judged.adequate is None or judged.unexplained
     rivals = () if open_end else _rivals(rest, judged.extended, judged.classes)

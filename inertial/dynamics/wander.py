@@ -47,8 +47,8 @@ def wander(rows: Array, output: Array, known: Array, kernel: Array) -> Wander:
         return Wander(0.0, 0.0)
 
     def cost(log: float) -> float:
-        whole = known + np.exp(log) * kernel
-        root = np.linalg.cholesky(whole)
+        covariance = known + np.exp(log) * kernel
+        root = np.linalg.cholesky(covariance)
         x, y = np.linalg.solve(root, rows), np.linalg.solve(root, output)
         normal = x.T @ x
         rest = y - x @ np.linalg.solve(normal, x.T @ y)
@@ -192,9 +192,9 @@ def wander_posterior(
     variance = np.geomspace(1e-5, 1e4, GRID) * float(np.mean(contrasts**2))
     logs = np.empty((WALK_SHARES.size, GRID))
     for k, (part, turn) in enumerate(remainders.shares):
-        whole = white + variance[:, None] * part
-        prior = np.log(variance) + 0.5 * np.log(np.sum((part / whole) ** 2, axis=1))  # over ln of the variance
-        logs[k] = prior - 0.5 * np.sum(np.log(whole) + (turn.T @ contrasts) ** 2 / whole, axis=1)
+        total = white + variance[:, None] * part
+        prior = np.log(variance) + 0.5 * np.log(np.sum((part / total) ** 2, axis=1))  # over ln of the variance
+        logs[k] = prior - 0.5 * np.sum(np.log(total) + (turn.T @ contrasts) ** 2 / total, axis=1)
     shares = WALK_SHARES[:, None] * variance
     sides = ((variance - shares) / sizes[0]).ravel(), (shares / sizes[1]).ravel()
     log = logs.ravel() + sum(

@@ -91,15 +91,15 @@ def _shaped(made: Any, needed: tuple[int, ...], where: str, method: str) -> Arra
     """What a method returned, for every unit; refused unless it has the dwells and coefficients of ``needed`` in this order."""
     try:
         values = np.asarray(made, dtype=float)
-        whole = np.broadcast_shapes(values.shape, needed)
+        shape = np.broadcast_shapes(values.shape, needed)
     except (TypeError, ValueError):
-        values = whole = None
+        values = shape = None
     trailing = 2 if method == "columns" else 3  # axes that are the effect's: dwells (and force axes) and coefficients
-    if values is None or whole is None or values.shape[-trailing:] != needed[-trailing:]:
+    if values is None or shape is None or values.shape[-trailing:] != needed[-trailing:]:
         found = f"shape {np.shape(made)}" if isinstance(made, np.ndarray) else type(made).__name__
         what = "dwells, coefficients" if method == "columns" else "dwells, 3, parameters"
         raise BrokenEffect(
             f"{where}: {method} returned {found}, shape {needed} is needed (…, {what}; as many as names gives); "
             "inertial.effects.base.stack makes it"
         )
-    return values if values.shape == whole else np.broadcast_to(values, whole)
+    return values if values.shape == shape else np.broadcast_to(values, shape)

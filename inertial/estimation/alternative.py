@@ -116,12 +116,12 @@ class Handling(Effect):
         """Columns of all blocks, (blocks, n, k); zero in unaffected units."""
         change = of_outputs(lot, self.change(lot, slope, **location))
         units, n = lot.state.time.shape
-        whole = np.zeros((units, n, len(lot.state.axes), change.shape[-1]))
+        changes = np.zeros((units, n, len(lot.state.axes), change.shape[-1]))
         if "unit" in location:
-            whole[int(location["unit"])] = change[0]
+            changes[int(location["unit"])] = change[0]
         else:
-            whole[:] = change
-        return by_block(whole)
+            changes[:] = change
+        return by_block(changes)
 
 
 class OfOneDwell(Handling):

@@ -78,13 +78,13 @@ def basis(columns: Array) -> tuple[Array, Places, float]:
     return q, keep.sum(axis=-1), determinant or 0.0
 
 
-def schur(gram: Array, whole: Array | None = None) -> float:
+def schur(gram: Array, full: Array | None = None) -> float:
     """Sum of squares of the first target after the others.
 
-    whole : products of the targets of which these are left; a target of which rounding is left explains nothing
+    full : products of the targets of which these are left; a target of which rounding is left explains nothing
     """
     squares = np.diag(gram)[1:]
-    seen = squares > (0.0 if whole is None else _LEFT * np.diag(whole)[1:])
+    seen = squares > (0.0 if full is None else _LEFT * np.diag(full)[1:])
     if not seen.any():
         return float(gram[0, 0])
     size = np.sqrt(squares[seen])

@@ -211,8 +211,8 @@ def slope_of(model: Model) -> Array | None:
         )
         moved = replace(state, temperature=state.temperature + sign * _WARMER, history=history, memory={})
         problem = Problem(replace(lot, state=moved))
-        whole = _columns(problem, [t for t in fit.terms if not t.shared])
-        ends.append(np.einsum("bnp,bp->bn", whole, fit.local[:, : whole.shape[-1]]))
+        columns = _columns(problem, [t for t in fit.terms if not t.shared])
+        ends.append(np.einsum("bnp,bp->bn", columns, fit.local[:, : columns.shape[-1]]))
     slope = (ends[0] - ends[1]) / (2.0 * _WARMER)
     if float(np.max(np.abs(slope))) <= 0.0:
         return None

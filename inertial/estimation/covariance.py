@@ -102,9 +102,9 @@ class Covariance:
         self._kept.clear()
         self._used = 0
 
-    def like(self, whole: "Covariance") -> None:
+    def like(self, larger: "Covariance") -> None:
         """Take the whiteners of another covariance, of more blocks, where the blocks of each have one in common."""
-        kernels, whiteners = whole._kernels, whole._whiteners  # noqa: SLF001  # of its own kind
+        kernels, whiteners = larger._kernels, larger._whiteners  # noqa: SLF001  # of its own kind
         kernel, other = self._kernels[0], kernels[0]
         same = len(self._kernels) == len(kernels) == 1 and other.fits(kernel.time, kernel.there, kernel.profile)
         if same and np.array_equal(kernel.time, other.time):
@@ -277,18 +277,18 @@ class Covariance:
         They depend on the columns and the shares alone, and are stored for the models that are tried at the same shares.
         """
         name = (candidate.key, shares)
-        kept = None if candidate.key is None else self._kept.get(name)
-        if kept is None:
+        stored = None if candidate.key is None else self._kept.get(name)
+        if stored is None:
             level = self.level if candidate.blocks is None else self.level[candidate.blocks]
-            kept = _products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
+            stored = _products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
             if candidate.key is not None:
-                self._kept[name] = kept
-                self._used += kept.size
+                self._kept[name] = stored
+                self._used += stored.size
                 while self._used > _PRODUCTS and self._kept:
                     self._used -= self._kept.popitem(last=False)[1].size
         else:
             self._kept.move_to_end(name)
-        return kept
+        return stored
 
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""

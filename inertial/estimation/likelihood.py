@@ -171,8 +171,8 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
     inverse = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-4, hermitian=True)
     fitted = (unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ space.residual[..., None])))[..., 0]
     fitted = fitted.reshape(units, model.problem.per_unit, -1)
-    whole = float(np.sum(fitted**2))
-    return float(units * np.sum(fitted.mean(axis=0) ** 2) / whole) if whole > 0.0 else 0.0
+    total = float(np.sum(fitted**2))
+    return float(units * np.sum(fitted.mean(axis=0) ** 2) / total) if total > 0.0 else 0.0
 
 
 def shared_factor(model: Model, term: Term) -> float:
@@ -217,5 +217,5 @@ def _alike(model: Model, term: Term, units: int) -> float:
 def _pairwise(series: Array) -> float:
     """Mean correlation between the rows (units, m), by their common size."""
     units = len(series)
-    whole = float(np.sum(series**2))
-    return 0.0 if whole <= 0.0 else (float(np.sum(series.sum(axis=0) ** 2)) / whole - 1.0) / (units - 1)
+    total = float(np.sum(series**2))
+    return 0.0 if total <= 0.0 else (float(np.sum(series.sum(axis=0) ** 2)) / total - 1.0) / (units - 1)

@@ -114,9 +114,9 @@ def _of_soak(model: Model, series: Array, places: Places) -> Array:
 def inner_mean(left: Array) -> Array:
     """Mean of the smaller three quarters of the squares of each row (..., n), NaN where missing: no single bad dwell is in it."""
     size = np.sort(np.where(np.isfinite(left), left, np.inf) ** 2, axis=-1)
-    kept = np.maximum((3 * np.isfinite(left).sum(axis=-1)) // 4, 1)
-    inner = np.arange(size.shape[-1]) < kept[..., None]
-    return np.where(inner, size, 0.0).sum(axis=-1) / kept
+    count = np.maximum((3 * np.isfinite(left).sum(axis=-1)) // 4, 1)
+    inner = np.arange(size.shape[-1]) < count[..., None]
+    return np.where(inner, size, 0.0).sum(axis=-1) / count
 
 
 def _columns(force: Array, time: Array) -> Array | None:

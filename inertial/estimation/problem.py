@@ -133,13 +133,13 @@ class Problem:
     def columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
         """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
         key = (effect.id, *values.items())
-        kept = self._terms.get(key)
-        if kept is None:
-            kept = self._columns(effect, values)
-            if kept.size < self._room:
-                self._room -= kept.size
-                self._terms[key] = kept
-        return kept
+        stored = self._terms.get(key)
+        if stored is None:
+            stored = self._columns(effect, values)
+            if stored.size < self._room:
+                self._room -= stored.size
+                self._terms[key] = stored
+        return stored
 
     def _columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
         if isinstance(effect, Handling):
@@ -207,13 +207,13 @@ class Problem:
 
     def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
         """A candidate, from the store or made; stored where its columns have room."""
-        kept = self._kept.get(key)
-        if kept is None:
-            kept = make()
-            if kept.columns.size < self._room:
-                self._room -= kept.columns.size
-                self._kept[key] = kept
-        return kept
+        candidate = self._kept.get(key)
+        if candidate is None:
+            candidate = make()
+            if candidate.columns.size < self._room:
+                self._room -= candidate.columns.size
+                self._kept[key] = candidate
+        return candidate
 
     @property
     def at_a_time(self) -> int:
@@ -299,14 +299,14 @@ class Problem:
             by_block = np.swapaxes(columns, 1, 2).reshape(m * few, n, g, k)
             return Candidate(by_block, shared=True, rows=rows, units=units, key=key, per_unit=m)
 
-        kept = self._stored(key, made)
-        if kept.rows is not None:
-            yield kept
+        candidate = self._stored(key, made)
+        if candidate.rows is not None:
+            yield candidate
             return
         for start in range(0, units.size, size):
             some = units[start : start + size]
             blocks = blocks_of_units(some, len(self.axes))
-            yield replace(kept, columns=kept.columns[blocks], units=some, key=(*key, start, size))
+            yield replace(candidate, columns=candidate.columns[blocks], units=some, key=(*key, start, size))
 
     def _together(self, effect: Handling, places: Sequence[Values]) -> Candidate:
         """Columns of an alternative of the whole lot at some locations."""

@@ -168,10 +168,10 @@ class LikelihoodProfile:
                 else np.stack([remaining[a::3].sum(axis=0) for a in range(_AXES)])
             )
             return remaining.sum(axis=0), axes
-        whole = np.einsum("bnt,bns->ts", both, both) - np.einsum("bgpt,bgps->gts", along, along, optimize=True)
-        inner = np.linalg.pinv(whole[:, r:, r:], rcond=_JITTER, hermitian=True)
-        taken = np.einsum("gtq,gqs,gts->gt", whole[:, :r, r:], inner, whole[:, :r, r:], optimize=True)
-        return np.maximum(np.einsum("gtt->gt", whole[:, :r, :r]) - taken, 0.0), None
+        products = np.einsum("bnt,bns->ts", both, both) - np.einsum("bgpt,bgps->gts", along, along, optimize=True)
+        inner = np.linalg.pinv(products[:, r:, r:], rcond=_JITTER, hermitian=True)
+        taken = np.einsum("gtq,gqs,gts->gt", products[:, :r, r:], inner, products[:, :r, r:], optimize=True)
+        return np.maximum(np.einsum("gtt->gt", products[:, :r, :r]) - taken, 0.0), None
 
 
 def _value(values: Values, parameter: Nonlinear, axis: int | None) -> float:

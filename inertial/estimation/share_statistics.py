@@ -244,13 +244,13 @@ def _beside_common(products: Array, rank: int, scale: Array) -> Left | None:
         return None  # some are limited in what they count
     left = unit[:, rank:, rank:] - np.swapaxes(across, -1, -2) @ np.linalg.solve(inner, across)
     left *= size[:, rank:, None] * size[:, None, rank:]
-    whole = np.sum(left / scale[:, None, None] ** 2, axis=0)
+    summed = np.sum(left / scale[:, None, None] ** 2, axis=0)
     before = np.sum((size[:, rank:] / scale[:, None]) ** 2, axis=0)
-    after = np.diagonal(whole)
+    after = np.diagonal(summed)
     if float((after[:-1] / before[:-1]).min(initial=1.0)) < _ABSORBED:
         return None
     root = np.sqrt(after[:-1])
-    gram, right = whole[:-1, :-1] / np.outer(root, root), whole[:-1, -1] / root
+    gram, right = summed[:-1, :-1] / np.outer(root, root), summed[:-1, -1] / root
     if float(np.linalg.eigvalsh(gram).min(initial=1.0)) < _ABSORBED:
         return None
     sizes = np.append(-np.linalg.solve(gram, right) / root, 1.0)

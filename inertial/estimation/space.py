@@ -201,8 +201,8 @@ class Space:
         with_rows = times_rows(self._rows, candidate)
         local = self.q.shape[-1]
         scale = self.noise.scale if candidate.blocks is None else self.noise.scale[candidate.blocks]
-        whole = self.covariance.products(candidate, self.noise.shares) / scale[:, None, None, None] ** 2
-        return Products(whole, with_rows[..., :local], with_rows[..., local:])
+        gram = self.covariance.products(candidate, self.noise.shares) / scale[:, None, None, None] ** 2
+        return Products(gram, with_rows[..., :local], with_rows[..., local:])
 
     def gain(self, candidate: Candidate) -> Gain:
         """Gain of a candidate on the residuals."""
@@ -233,11 +233,11 @@ class Space:
             # rows of Pᵀ from the left: the part that the local columns explain is subtracted
             back = np.swapaxes(self.targets[members], -1, -2) @ whitener
             along = np.swapaxes(self.q[members], -1, -2) @ whitener
-            whole = np.sum(whitener**2, axis=0) / scale**2
-            diagonal = np.maximum(whole - np.einsum("brn,brn->bn", along, along) / scale**2, 0.0)
+            precision = np.sum(whitener**2, axis=0) / scale**2
+            diagonal = np.maximum(precision - np.einsum("brn,brn->bn", along, along) / scale**2, 0.0)
             inside += np.einsum("bnp,btn->npt", columns[members], back / scale[..., None])
             left += np.einsum("bnp,bnr,bn->npr", columns[members], columns[members], diagonal)
-            size += np.einsum("bnp,bn->np", columns[members] ** 2, whole)
+            size += np.einsum("bnp,bn->np", columns[members] ** 2, precision)
         size = np.sqrt(np.where(size > 0.0, size, 1.0))
         return self._solved((left / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places])
 
@@ -261,8 +261,8 @@ class Space:
         inner = np.linalg.pinv(left[:, 1:, 1:] / np.outer(size, size), rcond=1e-8, hermitian=True)
         again = np.einsum("gqp,gp->gq", inner, left[:, 1:, 0] / size) / size
         turned = np.concatenate([np.ones((len(left), 1)), -again], axis=-1)
-        whole = np.einsum("bnt,bns->bts", self.targets, self.targets)
-        after = np.einsum("bts,gt,gs->bg", whole, turned, turned, optimize=True)
+        products = np.einsum("bnt,bns->bts", self.targets, self.targets)
+        after = np.einsum("bts,gt,gs->bg", products, turned, turned, optimize=True)
         after -= np.sum(np.einsum("bgrt,gt->bgr", along, turned) ** 2, axis=-1)
         return np.einsum("bn,bn->b", self.residual, self.residual)[:, None] - after
 

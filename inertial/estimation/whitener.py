@@ -152,7 +152,7 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     index : steps of the lattice at which the shares of 1/f and of random walk stand; None for none
     wander : covariances (n, n) of 1/f and of random walk of variance one; None for records too long for them
     """
-    there, whole = dwells.there, bool(dwells.there.all())
+    there, complete = dwells.there, bool(dwells.there.all())
     white = np.where(there, 1.0 / dwells.white, 0.0)
     if wander is None or index == [None, None]:
         return Whitener(there, white, 2.0 * float(np.sum(np.log(dwells.white[there]))))
@@ -161,7 +161,7 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     for i, each in zip(index, wander, strict=True):
         if i is not None:
             covariance += 10.0 ** (i / SHARE_STEP) * dwells.louder(each)
-    if not whole:
+    if not complete:
         covariance = covariance[np.ix_(there, there)]
     # of the transpose, which is in Fortran order: no copy
     upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
@@ -169,7 +169,7 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
         raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
     logdet = 2.0 * float(np.sum(np.log(np.diagonal(upper))))
     lower = _invert(upper, lower=0, overwrite_c=1)[0].T
-    if not whole:
+    if not complete:
         filled = np.zeros((there.size, there.size))
         filled[np.ix_(there, there)] = lower
         lower = filled

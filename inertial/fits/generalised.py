@@ -291,15 +291,15 @@ class Restricted:
 
 def _common(h: Array) -> tuple[Array, Array]:
     """Columns (n, c) that every block has, wherever they stand in it, and the others of each block, (b, n, p − c)."""
-    kept = np.ones((h.shape[0], h.shape[2]), dtype=bool)
+    remaining = np.ones((h.shape[0], h.shape[2]), dtype=bool)
     common: list[Array] = []
     blocks = np.arange(len(h))
     for column in h[0].T:
-        same = np.all(h == column[:, None], axis=1) & kept
+        same = np.all(h == column[:, None], axis=1) & remaining
         if same.any(axis=1).all():
-            kept[blocks, same.argmax(axis=1)] = False
+            remaining[blocks, same.argmax(axis=1)] = False
             common.append(column)
-    others = np.swapaxes(np.swapaxes(h, 1, 2)[kept].reshape(len(h), -1, h.shape[1]), 1, 2)
+    others = np.swapaxes(np.swapaxes(h, 1, 2)[remaining].reshape(len(h), -1, h.shape[1]), 1, 2)
     return np.stack(common, axis=1) if common else np.zeros((h.shape[1], 0)), others
 
 

@@ -178,9 +178,9 @@ def of_every_axis(rows: Array, axes: tuple[int, ...], fill: float = 0.0) -> Arra
     """Rows (..., m, k) of the axes with an output at their indices among three, (..., 3, k); the others hold ``fill``."""
     if len(axes) == 3:
         return rows
-    whole = np.full((*rows.shape[:-2], 3, rows.shape[-1]), fill)
-    whole[..., axes, :] = rows
-    return whole
+    of_all = np.full((*rows.shape[:-2], 3, rows.shape[-1]), fill)
+    of_all[..., axes, :] = rows
+    return of_all
 
 
 def own_terms(rows: Array, axes: tuple[int, ...]) -> Array:

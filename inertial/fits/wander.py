@@ -184,9 +184,9 @@ def fit_lot_with_wander(  # noqa: PLR0913 - what a fit needs, and what of it is 
     if believed is not None:
         both = believed(theta, theta_covariance)
         inside = inside + np.einsum("...np,...p->...n", columns.local, both.coefficients - theta)
-        kept, back = both.kept, np.swapaxes(both.kept, -1, -2)
-        rest = (both.covariance - kept @ theta_covariance @ back) / (known * wide[..., None]) ** 2
-        solved = replace(solved, gain=kept @ solved.gain, inverse=kept @ solved.inverse @ back + rest)
+        of_fit, back = both.of_fit, np.swapaxes(both.of_fit, -1, -2)
+        rest = (both.covariance - of_fit @ theta_covariance @ back) / (known * wide[..., None]) ** 2
+        solved = replace(solved, gain=of_fit @ solved.gain, inverse=of_fit @ solved.inverse @ back + rest)
         theta, theta_covariance, of_prior = both.coefficients, both.covariance, both.share
     left = _ResidualCovariance(columns.local, shared, solved, covariance, there)
     weighted = replace(

@@ -177,13 +177,13 @@ class ProposalSearch:
             if not within or promised - now < min(self.aim.least, 0.5 * (1.0 - now)):
                 break
             chosen, now = [*chosen, chosen[0]], promised
-        whole = None
+        sufficient = None
         if singles is not None:
-            whole = singles.shortest(_ALL, below=self.minutes(chosen) if now >= _ALL else float("inf"))
-        if whole is not None:
-            promised = self.share([whole.course], fine=True)
+            sufficient = singles.shortest(_ALL, below=self.minutes(chosen) if now >= _ALL else float("inf"))
+        if sufficient is not None:
+            promised = self.share([sufficient.course], fine=True)
             if promised >= min(now, _ALL):
-                chosen, now = [whole.course], promised
+                chosen, now = [sufficient.course], promised
         return self._proposal(chosen, now) if chosen else None
 
     def _kept(self, chosen: Sequence[StepSequence], offers: Offers, now: float) -> tuple[Offer, float] | None:

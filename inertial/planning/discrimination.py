@@ -64,14 +64,14 @@ class Discrimination:
         """χ² (..., axes) of the true rival after a fit of the base model and the wrong rival."""
         of_true, fitted = list(self.rivals[true]), [*self.base, *self.rivals[wrong]]
         size = self.sizes[true]
-        whole = np.einsum("ak,...akl,al->...a", size, matrix[..., of_true, :][..., of_true], size)
+        total = np.einsum("ak,...akl,al->...a", size, matrix[..., of_true, :][..., of_true], size)
         cross = np.einsum("...akl,al->...ak", matrix[..., fitted, :][..., of_true], size)
         scaled, scale = _scaled(matrix[..., fitted, :][..., fitted])
         part = cross / scale
         absorbed = np.einsum(
             "...ak,...ak->...a", part, np.linalg.solve(scaled + _RIDGE * np.eye(len(fitted)), part[..., None])[..., 0]
         )
-        return np.maximum(whole - absorbed, _NEGLIGIBLE * np.maximum(whole, _TINY))
+        return np.maximum(total - absorbed, _NEGLIGIBLE * np.maximum(total, _TINY))
 
 
 def _scaled(matrix: Array) -> tuple[Array, Array]:

@@ -210,12 +210,12 @@ def _effective_remedies(
             return [remedy]
     if len(applicable) < 2 or not visible(_with_all(state, applicable)):
         return []
-    kept = applicable
+    needed = applicable
     for remedy in applicable:
-        fewer = [r for r in kept if r is not remedy]
+        fewer = [r for r in needed if r is not remedy]
         if fewer and visible(_with_all(state, fewer)):
-            kept = fewer
-    return kept
+            needed = fewer
+    return needed
 
 
 def _with_all(state: State, remedies: Sequence[Remedy]) -> State:

@@ -35,8 +35,8 @@ class Groups:
 
     def of(self, name: str) -> tuple[Array, Array]:
         """Mean (m, p) and covariance (m, p, p) of a unit of a group, in a lot of its own."""
-        whole = self.family.within + self.family.between
-        return self.family.mean + self.shift[name], whole - self.spread + self.left[name]
+        of_family = self.family.within + self.family.between
+        return self.family.mean + self.shift[name], of_family - self.spread + self.left[name]
 
 
 def groups_of(family: Family, values: Array, covariance: Array, lot: Index, group: Sequence[str]) -> Groups:
@@ -89,11 +89,11 @@ def _between_lots(means: Sequence[Array]) -> Array:
     return (np.einsum("ai,aj->aij", total, total) - squares) / (len(means) * (len(means) - 1))
 
 
-def _within_limits(spread: Array, whole: Array) -> Array:
-    """A covariance (m, p, p) that is positive and explains no more than most of the whole."""
-    root = np.linalg.cholesky(whole)
+def _within_limits(spread: Array, total: Array) -> Array:
+    """A covariance (m, p, p) that is positive and explains no more than most of a total (m, p, p)."""
+    root = np.linalg.cholesky(total)
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(inverse @ spread @ np.swapaxes(inverse, -1, -2))
     turned = root @ vectors
-    kept = np.clip(values, 0.0, _MOST)
-    return np.asarray((turned * kept[..., None, :]) @ np.swapaxes(turned, -1, -2), dtype=np.float64)
+    limited = np.clip(values, 0.0, _MOST)
+    return np.asarray((turned * limited[..., None, :]) @ np.swapaxes(turned, -1, -2), dtype=np.float64)

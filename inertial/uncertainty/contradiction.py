@@ -83,11 +83,11 @@ def without(evidence: CommonEvidence, places: Places) -> CommonEvidence:
     """The evidence on the other influences, these being free: what they can imitate is taken out."""
     if not places.size:
         return evidence
-    kept = np.setdiff1d(np.arange(evidence.projection.size), places)
+    others = np.setdiff1d(np.arange(evidence.projection.size), places)
     inverse = np.linalg.pinv(evidence.information[np.ix_(places, places)], hermitian=True)
-    turn = evidence.information[np.ix_(kept, places)] @ inverse
-    information = evidence.information[np.ix_(kept, kept)] - turn @ evidence.information[np.ix_(places, kept)]
-    return CommonEvidence(information, evidence.projection[kept] - turn @ evidence.projection[places])
+    turn = evidence.information[np.ix_(others, places)] @ inverse
+    information = evidence.information[np.ix_(others, others)] - turn @ evidence.information[np.ix_(places, others)]
+    return CommonEvidence(information, evidence.projection[others] - turn @ evidence.projection[places])
 
 
 def sizes(
@@ -151,9 +151,9 @@ def beyond(evidence: CommonEvidence, places: Places, groups: Mapping[str, Places
 def _independent(evidence: CommonEvidence) -> tuple[Array, Array]:
     """M (r, q) and w (r,) ~ N(0, 1 + M·Mᵀ): the evidence in directions of noise one."""
     values, vectors = np.linalg.eigh(evidence.information)
-    kept = values > LEAST_INFORMATION
-    root = np.sqrt(values[kept])
-    return root[:, None] * vectors[:, kept].T, vectors[:, kept].T @ evidence.projection / root
+    informative = values > LEAST_INFORMATION
+    root = np.sqrt(values[informative])
+    return root[:, None] * vectors[:, informative].T, vectors[:, informative].T @ evidence.projection / root
 
 
 def _parts(rest: Array, group: Array, value: Array) -> tuple[Array, Array]:

@@ -44,8 +44,8 @@ class NormDesign:
         """Share (q,) of the influences on the norms that the residuals of the fit can show."""
         shown = self._shown(changes)[self.used]
         left = shown - self.rows[self.used] @ (self.gain @ shown)
-        whole = np.linalg.norm(shown, axis=0)
-        return np.linalg.norm(left, axis=0) / np.where(whole > 0.0, whole, 1.0)
+        total = np.linalg.norm(shown, axis=0)
+        return np.linalg.norm(left, axis=0) / np.where(total > 0.0, total, 1.0)
 
     def prediction(self, covariance: Array) -> Array:
         """Covariance (m, m) of the residuals of the dwells that are not fitted, g², by the noise of all dwells (n, n)."""

@@ -58,8 +58,8 @@ class FitDesign:
         """
         explained = self.columns @ (self.coefficient_errors(changes) if errors is None else errors)
         left = np.subtract(np.moveaxis(changes, -2, -3), explained, out=explained)
-        whole = _sizes(changes)
-        return _sizes(left) / np.where(whole > 0.0, whole, 1.0)
+        total = _sizes(changes)
+        return _sizes(left) / np.where(total > 0.0, total, 1.0)
 
 
 def _sizes(columns: Array) -> Array:

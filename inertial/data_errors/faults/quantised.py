@@ -59,7 +59,7 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
     square = _without_drivers(readings, unit, there, spread**2)
     if np.std(square) / (2.0 * typical**2) < decisions.STEPS_UNEVEN / np.sqrt(2.0 * float(np.median(count))):
         return None
-    whole, reach = float(np.sum(square**2)), float(np.ptp(mean))
+    total, reach = float(np.sum(square**2)), float(np.ptp(mean))
     # p(1 − p) is at most a quarter: the largest scatter is half a step
     low, high = 1.6 * float(spread.max()), 2.6 * float(spread.max())
     if reach <= 0.0 or reach / low > _MOST_STEPS:
@@ -72,7 +72,7 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
         waves = waves - waves.mean(axis=1, keepdims=True)
         gram = np.swapaxes(waves, -1, -2) @ waves + 1e-9 * np.eye(2)
         inside = np.einsum("rnk,n->rk", waves, square)
-        explained = np.einsum("rk,rk->r", inside, np.linalg.solve(gram, inside[..., None])[..., 0]) / whole
+        explained = np.einsum("rk,rk->r", inside, np.linalg.solve(gram, inside[..., None])[..., 0]) / total
         peak = int(np.argmax(explained))
         if explained[peak] > best:
             best, step = float(explained[peak]), 1.0 / float(part[peak])

@@ -85,8 +85,8 @@ def delayed(state: State, tau: Array) -> State:
     history = state.history
     if history is None:
         return replace(state, temperature=_lag(state.time, state.temperature, tau), memory={})
-    whole = np.broadcast_to(history.temperature, (len(tau), history.time.size))
-    late = _lag(np.broadcast_to(history.time, whole.shape), whole, tau)
+    recorded = np.broadcast_to(history.temperature, (len(tau), history.time.size))
+    late = _lag(np.broadcast_to(history.time, recorded.shape), recorded, tau)
     each = [np.interp(t, history.time, h) for t, h in zip(state.time, late, strict=True)]
     return replace(state, temperature=np.stack(each), history=History(history.time, late), memory={})
 

@@ -61,9 +61,9 @@ class UnitsSwapped(Handling):
         """With the readings exchanged back: the temperatures, too, if the model fits better with them."""
         unit, partner, _ = _places(lot, **location)
         outputs = _outputs_exchanged(lot, **location)
-        whole = replace(outputs, state=_temperatures_exchanged(lot.state, **location))
-        misfits = [misfit(each.units([unit, partner]), (unit, partner), own_noise=True) for each in (outputs, whole)]
-        return outputs if misfits[0] <= misfits[1] else whole
+        both = replace(outputs, state=_temperatures_exchanged(lot.state, **location))
+        misfits = [misfit(each.units([unit, partner]), (unit, partner), own_noise=True) for each in (outputs, both)]
+        return outputs if misfits[0] <= misfits[1] else both
 
 
 def _places(lot: Lot, **location: float) -> tuple[int, int, Flags]:
