@@ -113,7 +113,7 @@ def _without_wander(model: Model, judged: Term | None) -> LeftOut:
     problem = model.problem
     fold = _by_pose(problem)
     residuals = np.full((problem.blocks, problem.n), np.nan)
-    keeps = _kept(model, judged)
+    keeps = _fixed(model, judged)
     series = problem.y
     if keeps.any():
         series = series - model.shared[..., keeps] @ model.space.shared_sizes[keeps]
@@ -128,7 +128,7 @@ def _keeps(term: Term, judged: Term | None) -> bool:
     return isinstance(term.effect, Handling) and (judged is None or term.key != judged.key)
 
 
-def _kept(model: Model, judged: Term | None) -> Flags:
+def _fixed(model: Model, judged: Term | None) -> Flags:
     """The shared columns (q,) of a model that keep their coefficients."""
     keeps = np.zeros(model.shared.shape[-1], dtype=bool)
     for term, columns in model.slices(shared=True):
@@ -150,7 +150,7 @@ class _Parts:
         inner = np.einsum("bnq,bnr->qr", white[..., 1:], white[..., 1:])
         if z.shape[-1]:
             py = py - pz @ np.linalg.lstsq(inner, np.einsum("bnq,bn->q", white[..., 1:], white[..., 0]), rcond=1e-10)[0]
-        again = ~_kept(model, judged)
+        again = ~_fixed(model, judged)
         pz, self.inner = pz[..., again], inner[np.ix_(again, again)]
         level = space.covariance.level * space.noise.scale
         along = space.backed(space.q) * level[:, None, None]

@@ -81,7 +81,7 @@ class Covariance:
         self.span = max(float(np.ptp(time)), 1.0)
         self._kernels, self._groups = grouped(time, error, direction, self.level, self.white, loudness)
         self._whiteners: OrderedDict[tuple[int, int | None, int | None], Whitener] = OrderedDict()
-        self._kept: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
+        self._store: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
         self._used = 0
 
     @cached_property
@@ -99,7 +99,7 @@ class Covariance:
 
     def forget(self) -> None:
         """Drop the stored products."""
-        self._kept.clear()
+        self._store.clear()
         self._used = 0
 
     def like(self, larger: "Covariance") -> None:
@@ -277,17 +277,17 @@ class Covariance:
         They depend on the columns and the shares alone, and are stored for the models that are tried at the same shares.
         """
         name = (candidate.key, shares)
-        stored = None if candidate.key is None else self._kept.get(name)
+        stored = None if candidate.key is None else self._store.get(name)
         if stored is None:
             level = self.level if candidate.blocks is None else self.level[candidate.blocks]
             stored = _products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
             if candidate.key is not None:
-                self._kept[name] = stored
+                self._store[name] = stored
                 self._used += stored.size
-                while self._used > _PRODUCTS and self._kept:
-                    self._used -= self._kept.popitem(last=False)[1].size
+                while self._used > _PRODUCTS and self._store:
+                    self._used -= self._store.popitem(last=False)[1].size
         else:
-            self._kept.move_to_end(name)
+            self._store.move_to_end(name)
         return stored
 
     def logdet(self, shares: Shares) -> Array:

@@ -78,7 +78,7 @@ class Problem:
         self.n = n
         self.error = self._error()
         self.y = self._series()
-        self._kept: dict[tuple[object, ...], Candidate] = {}
+        self._store: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
         self.deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
@@ -92,7 +92,7 @@ class Problem:
 
     def forget(self) -> None:
         """Drop the stored columns and products: they are made again where they are needed."""
-        self._kept.clear()
+        self._store.clear()
         self._terms.clear()
         self._room = _CACHE
         self.covariance.forget()
@@ -207,12 +207,12 @@ class Problem:
 
     def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
         """A candidate, from the store or made; stored where its columns have room."""
-        candidate = self._kept.get(key)
+        candidate = self._store.get(key)
         if candidate is None:
             candidate = make()
             if candidate.columns.size < self._room:
                 self._room -= candidate.columns.size
-                self._kept[key] = candidate
+                self._store[key] = candidate
         return candidate
 
     @property

@@ -70,7 +70,7 @@ class ShareStatistics:
 
     def __init__(self, problem: Problem, local: Array, shared: Array) -> None:
         self.problem, self._local, self._shared = problem, local, shared
-        self._kept: dict[Shares, Array] = {}
+        self._store: dict[Shares, Array] = {}
         self._single: dict[tuple[int, Shares], Array] = {}
 
     @property
@@ -154,9 +154,9 @@ class ShareStatistics:
     def _products(self, shares: Shares) -> Array:
         """Products (blocks, r + q + 1, r + q + 1) of the columns and the measurements with each other."""
         common = shares.common
-        if common not in self._kept:
-            self._kept = {common: self._made(common)}  # the last alone: a search for shares seldom goes back
-        products = self._kept[common]
+        if common not in self._store:
+            self._store = {common: self._made(common)}  # the last alone: a search for shares seldom goes back
+        products = self._store[common]
         if shares.by_block:
             products = products.copy()
             for block, flicker, walk in shares.by_block:
@@ -177,8 +177,8 @@ class ShareStatistics:
 
     def _of_block(self, block: int, shares: Shares) -> Array:
         """The products of one block, at shares that are its own or the lot's."""
-        if shares in self._kept:
-            return self._kept[shares][block]
+        if shares in self._store:
+            return self._store[shares][block]
         if (block, shares) not in self._single:
             covariance = self.problem.covariance
             made = covariance.whitener_of_block(block, shares).rows(self._rows[block])

@@ -166,7 +166,7 @@ class ProposalSearch:
                 break
             offers = Offers(self, chosen, now)
             singles = singles or offers
-            taken = self._kept(chosen, offers, now)
+            taken = self._confirmed(chosen, offers, now)
             if taken is None:
                 break
             chosen, now = [*chosen, taken[0].course], taken[1]
@@ -186,7 +186,7 @@ class ProposalSearch:
                 chosen, now = [sufficient.course], promised
         return self._proposal(chosen, now) if chosen else None
 
-    def _kept(self, chosen: Sequence[StepSequence], offers: Offers, now: float) -> tuple[Offer, float] | None:
+    def _confirmed(self, chosen: Sequence[StepSequence], offers: Offers, now: float) -> tuple[Offer, float] | None:
         """The offer with the largest gain per minute whose gain remains when every rival is fitted, and the share after it.
 
         On the grid alone the wrong rivals seem more distant than they are: an offer is judged with every rival fitted, the best
