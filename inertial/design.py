@@ -110,7 +110,7 @@ def grid_of(effect: AnyEffect, state: State) -> list[dict[str, float]]:
 
 
 def resting_grid(effect: AnyEffect, state: State) -> list[dict[str, float]]:
-    """The same for a run that begins at rest: what a plan can show may not rest on the state that a run happens to begin in."""
+    """Starting values for a run that begins at rest: what a plan can show may not depend on the state that a run begins in."""
     return [values for values in grid_of(effect, state) if at_rest(effect, values)]
 
 

@@ -39,7 +39,7 @@ class Rival:
         return Rival(term, ratio.deviance, ratio.rank, -ratio.score, ratio.log_p, ratio)
 
     def at(self, shared: float) -> "Rival":
-        """The same rival with another φ."""
+        """The rival judged at another φ."""
         return self if self.ratio is None else Rival.of(self.term, self.ratio.at(shared))
 
 

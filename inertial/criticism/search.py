@@ -155,7 +155,7 @@ def is_remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
 
 
 def size_where_it_acts(model: Model, term: Term) -> float:
-    """The same over the dwells that the term changes: an error of one dwell is not diluted by the others."""
+    """RMS, g, of a term over the dwells that it changes: an error of one dwell is not diluted by the others."""
     size = size_of(model, term)
     if not isinstance(term.effect, Handling):
         return size

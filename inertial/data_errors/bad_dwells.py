@@ -154,7 +154,7 @@ class _Deletion:
         return self._squares().sum(axis=1)
 
     def _squares(self) -> Array:
-        """Its parts by axis, (units, axes, n)."""
+        """Square of the standardised deviation of each dwell by axis, (units, axes, n)."""
         return self._studentised(np.where(self.known, self.left**2 / self.known_size, 0.0))
 
     def _studentised(self, drop: Array) -> Array:

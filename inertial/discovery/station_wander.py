@@ -69,7 +69,7 @@ class Wander:
         return _gained(self.log_likelihood)
 
     def gained_beside(self, name: str) -> Array:
-        """The same with a driver's predictions in the model, (h,): what the driver does not explain."""
+        """Log likelihood that a walk gains with a driver's predictions in the model, (h,): what the driver does not explain."""
         known = self.beside.get(name)
         return np.zeros(self.log_likelihood.shape[1]) if known is None else _gained(known)
 

@@ -81,7 +81,7 @@ class Handling(Effect):
         raise NotImplementedError(f"{self.id}: a short text is missing beside the locations of 'instead'")
 
     def possible(self, size: Array) -> bool:
-        """Whether coefficients (k,) are possible for the alternative; others have another cause of the same shape."""
+        """Whether the alternative can have coefficients (k,); beyond them another cause has its shape."""
         return bool(np.isinf(self.of_one) or 1.0 / self.of_one < size[0] < self.of_one)
 
     def near(self, lot: "Lot", **location: float) -> list[dict[str, float]]:

@@ -126,7 +126,7 @@ def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
 
 
 def _with_start(problem: Problem, terms: Sequence[Term]) -> Array:
-    """The same with them."""
+    """Columns (blocks, n, p) of terms, then those of the unknown state of their memory."""
     return np.concatenate([_columns(problem, terms), *(t.start(problem) for t in terms)], axis=-1)
 
 

@@ -47,7 +47,7 @@ class Ratio:
     again: Callable[[float], "Ratio"] | None = None
 
     def at(self, shared: float) -> "Ratio":
-        """The same with another φ: rivals are compared at a common φ, because the estimate of each scatters."""
+        """The ratio at another φ: rivals are compared at a common φ, because the estimate of each scatters."""
         return self if self.again is None else self.again(shared)
 
     @property

@@ -187,9 +187,9 @@ class Model:
         return known
 
     def _deviance(self, shares: Shares) -> tuple[float, bool]:
-        """The same, computed: by the products of the columns if these are precise, else in the whitened space.
+        """The deviance of :meth:`_restricted`, and whether it holds for all models of equal terms.
 
-        And whether it is the same for all models of equal terms.
+        By the products of the columns if these are precise, else in the whitened space.
         """
         quick = self._statistics.left(shares, self._weights)
         if quick is None:

@@ -123,7 +123,7 @@ class LikelihoodProfile:
         return np.stack([known[name][0] for name in names]), np.stack(by_axis, axis=1) if by_axis else None
 
     def _at(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
-        """The same, computed."""
+        """Remaining sums of squares as of :meth:`_over`, computed."""
         candidate = self.problem.varied(wrong.effect, grid, first=wrong.first, start=True)
         if not wrong.shared:
             return self._local(candidate)

@@ -84,7 +84,7 @@ class TurnOnBias(SensorEffect):
         return stack(state, steps) if steps else np.zeros((*state.time.shape, 0))
 
     def names(self, axis: int) -> tuple[str, ...]:
-        """Its one name."""
+        """Name of the coefficient, equal on all axes."""
         return ("kP",)
 
 

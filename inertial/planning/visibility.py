@@ -122,10 +122,10 @@ def _information(state: State, base: Sequence[str], error: float, covariance: Ar
         return lambda columns: np.linalg.norm(columns, axis=-2) / error
     white = whitener(covariance)
     span = _span(state, base, white)
-    return lambda columns: np.linalg.norm(_beyond(span, white @ columns), axis=-2)
+    return lambda columns: np.linalg.norm(_orthogonal_part(span, white @ columns), axis=-2)
 
 
-def _beyond(span: Array, columns: Array) -> Array:
+def _orthogonal_part(span: Array, columns: Array) -> Array:
     """Columns (3, n, p) without their part in a span (3, n, q)."""
     return columns - span @ (np.swapaxes(span, -1, -2) @ columns)
 
@@ -176,8 +176,8 @@ def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | Non
 
 def _after(span: Array, columns: Array, start: Array) -> Array:
     """Columns (3, n, p) after the base model and after the unknown initial state of a memory (3, n, k)."""
-    remainder = _beyond(span, columns)
-    return _beyond(_basis(_beyond(span, start), 1e-9), remainder) if start.shape[-1] else remainder
+    remainder = _orthogonal_part(span, columns)
+    return _orthogonal_part(_basis(_orthogonal_part(span, start), 1e-9), remainder) if start.shape[-1] else remainder
 
 
 def _better(first: _Remainder, second: _Remainder) -> _Remainder:

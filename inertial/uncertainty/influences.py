@@ -47,7 +47,7 @@ class Errors:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def times(self, size: float) -> "Errors":
-        """The same errors, scaled."""
+        """The errors times a factor."""
         scaled: dict[str, Any] = {
             name: tuple(size * v for v in value) if isinstance(value, tuple) else size * value
             for name, value in vars(self).items()
@@ -137,7 +137,7 @@ def true_force(state: State, errors: Errors) -> Array:
 
 
 def _of_one(angle: Array) -> Array:
-    """The angles (n,) of one unit where all units (..., n) have the same, as on one table; else as they are."""
+    """The angles (n,) of one unit where all units (..., n) have equal ones, as on one table; else as they are."""
     rows = angle.reshape(-1, angle.shape[-1]) if angle.ndim > 1 else angle
     return (
         rows[0]

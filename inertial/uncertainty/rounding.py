@@ -52,7 +52,7 @@ def chance(p: float | None) -> str:
 
 
 def equal(p: float | None) -> str:
-    """The same with its sign."""
+    """The text of :func:`chance` after ``=``, or as it is where it begins with ``<``."""
     text = chance(p)
     return text if text.startswith("<") else f"= {text}"
 

@@ -21,7 +21,7 @@ class Fault:
     evidence: str
 
     def named(self, units: Sequence[str], dwells: Sequence[int]) -> "Fault":
-        """The same with the serials and the numbers of dwells in its evidence."""
+        """The fault with serials and numbers of dwells instead of indices in its evidence."""
         return replace(self, evidence=self.evidence.format(unit=units, dwell=dwells))
 
 

@@ -11,7 +11,7 @@ from inertial.data_errors.readings import Readings
 
 
 def stuck(readings: Readings) -> Iterator[Fault]:
-    """The same output, to the last digit, in dwells of different poses; or samples of a dwell that are all the same."""
+    """Outputs equal to the last digit in dwells of different poses; or samples of a dwell that are all equal."""
     for unit, out in enumerate(readings.output):
         still = _still(readings, unit)
         if still.size:

@@ -37,11 +37,11 @@ class SlipsUnderLoad(Handling):
 
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """What the angle adds in the poses beyond the load."""
-        return tilts(lot.state)[..., :1] * _beyond(lot, **location)[:, None, None]
+        return tilts(lot.state)[..., :1] * _overloaded(lot, **location)[:, None, None]
 
     def dwells(self, lot: Lot, **location: float) -> list[int]:
         """The dwells of the poses beyond the load."""
-        return np.flatnonzero(_beyond(lot, **location)).tolist()
+        return np.flatnonzero(_overloaded(lot, **location)).tolist()
 
     def describe(self, lot: Lot, size: Array, **location: float) -> str:
         """The angle, and where it is off."""
@@ -54,5 +54,6 @@ def _load(lot: Lot, side: float) -> Array:
     return side * np.sin(lot.state.need("outer", SlipsUnderLoad.id).reshape(-1, lot.state.time.shape[-1])[0])
 
 
-def _beyond(lot: Lot, **location: float) -> Flags:
+def _overloaded(lot: Lot, **location: float) -> Flags:
+    """Dwells (n,) whose load exceeds that of the location."""
     return _load(lot, location["side"]) > location["load"]
