@@ -44,7 +44,7 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
 
 
 def _seen_without(base: Model, effects: list[AnyEffect], term: Term, bad: list[BadDwell]) -> bool:
-    """Whether a term explains more than its price with the bad dwells left out, by what a named effect has to: one look only."""
+    """Whether a term explains more than its price with the bad dwells left out, as a named effect has to in a single look."""
     rest = model_without(base, [d.index for d in bad])
     return -judge(Candidates(rest.problem, effects), rest, term).cost > float(np.log(max(rest.problem.count, 1)))
 

@@ -119,7 +119,7 @@ def _alike(model: Model, term: Term) -> bool:
 
 
 def _with_jumps(judged: list[Rival], jumps: Jumps) -> list[Rival]:
-    """Rivals with the jumps of single axes that take the place of the best of them, at their score together."""
+    """Rivals with the jumps of single axes instead of the best rival, at the score that the jumps have together."""
     best, first = judged[0], jumps.terms[0]
     same = next((r for r in judged if r.term.effect.id == first.effect.id), replace(best, term=first, ratio=None))
     others = [r for r in judged if r is not same]

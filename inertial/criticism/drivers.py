@@ -117,13 +117,13 @@ def _transfer_curve(problem: Problem, values: Array) -> Candidate:
 
 
 def _of_axes(problem: Problem, columns: Array) -> Candidate:
-    """Columns (blocks or 3, n, d), the same for all units where they are of three axes."""
+    """Columns (blocks or 3, n, d): of all blocks, or of the three axes where all units have equal ones."""
     rows = None if len(columns) == problem.blocks else np.arange(problem.blocks) % problem.per_unit
     return Candidate(columns[:, :, None, :], shared=False, rows=rows)
 
 
 def _typical(problem: Problem, values: Array) -> tuple[Array, Array]:
-    """Forces and a quantity of one unit for all, where the forces are the same: a look needs no more."""
+    """Forces and a quantity of one unit instead of all, where the forces are equal in all: a look needs no more."""
     along = forces_along(problem)
     same = bool(np.all(along == along[:1]))
     return (along[:1], values.mean(axis=0, keepdims=True)) if same else (along, values)
@@ -194,7 +194,7 @@ def _pose_columns(state: State, most: int) -> Array:
 
 
 def _by_block(problem: Problem, columns: Array) -> Candidate:
-    """Columns (units, n, d), the same for every axis, as a candidate."""
+    """Columns (units, n, d), equal on every axis, as a candidate."""
     axes = problem.blocks // len(problem.lot.state.time)
     rows = np.arange(problem.blocks) // axes if len(columns) > 1 else np.zeros(problem.blocks, dtype=np.intp)
     return Candidate(columns[:, :, None, :], shared=False, rows=rows)

@@ -86,7 +86,7 @@ class ExaminedRun:
     _made: tuple[list[object], Model] | None = None
 
     def estimate_loudness(self) -> None:
-        """Estimate the noise of each soak again: an error that was corrected is none of it."""
+        """Estimate the noise of each soak again: an error that was corrected is not noise."""
         self.lot = replace(self.lot, loudness=None)
         if self.soak is None:
             self.soak = soaks(self.lot.state)  # a correction of temperatures changes none of the soaks
@@ -116,7 +116,7 @@ class ExaminedRun:
         return True
 
     def model(self) -> Model:
-        """The model that is judged, in the lot without its bad dwells; the same object while nothing changes."""
+        """The model that is judged, in the lot without its bad dwells; one object as long as nothing changes."""
         parts: list[object] = [self.lot, *self.removed, *self.beside]
         if self._made is None or list(map(id, self._made[0])) != list(map(id, parts)):
             self._made = parts, self._new_model()
@@ -134,7 +134,7 @@ class ExaminedRun:
 def examined(
     lot: Lot, effects: Sequence[str], barred: frozenset[str] = frozenset()
 ) -> "tuple[ExaminedRun, EffectSearch]":
-    """A run without bad dwells and handling errors, those of some ids excepted, and the search for effects in it."""
+    """A run without bad dwells and handling errors (except those of some ids), and the search for effects in it."""
     run = ExaminedRun(lot, tuple(effects), barred=set(barred))
     run.estimate_loudness()
     run.removed = bad_beside_effects(run.model(), run.effects)
@@ -156,7 +156,7 @@ def examined(
 
 
 def _dropped(run: ExaminedRun, searched: "EffectSearch") -> bool:
-    """Whether a handling error explains nothing any more beside what was found after it; then it is taken out."""
+    """Whether a handling error explains nothing any more beside what was found after it; it is then withdrawn."""
     for named in run.handled if len(run.handled) + len(searched.result.added) > 1 else ():
         if named.term is None:
             continue
@@ -170,7 +170,7 @@ def _dropped(run: ExaminedRun, searched: "EffectSearch") -> bool:
 
 
 def _placed_again(run: ExaminedRun, model: Model) -> bool:
-    """Whether a change during the run is at another dwell now that the bad dwells beside it are known; then it is moved there."""
+    """Whether a change during the run fits better at another dwell now that the bad dwells are known; it is then moved there."""
     moved = False
     for at, named in enumerate(run.handled):
         best = None if named.term is None else better_placed(model, named.term)

@@ -63,7 +63,7 @@ class Candidates:
         for effect in effects:
             try:
                 grid = grid_of(effect, problem.lot.state)
-                problem.one.columns(effect, grid[0])
+                problem.first_unit.columns(effect, grid[0])
             except MissingInput as reason:
                 self.lacking[effect.id] = reason.quantity
                 continue

@@ -100,7 +100,7 @@ def _score(drops: Array, rival: Rival, per_unit: int) -> float:
 
 
 def _evenness(drops: Array) -> float:
-    """Twice the logarithm of the probability that so few of several reductions have so much of them; zero where that is usual.
+    """Twice the log probability that the largest reductions (k,) exceed the others by as much; zero where that is usual.
 
     Coefficients from one normal distribution have reductions of chi-square of one degree of freedom each: those of the m largest
     and of the others have an F distribution, one for each of the possible choices. Noise alone gives one to each.

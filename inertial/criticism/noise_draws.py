@@ -247,6 +247,6 @@ def _lattice(shares: Shares) -> tuple[tuple[list[int | None], list[int | None]],
 
 
 def _about(k: int | None) -> list[int | None]:
-    """A share of the lattice, those about it, and none."""
+    """A share of the lattice, its neighbours, and none."""
     near = {LEAST_SHARE, LEAST_SHARE + 8} if k is None else {max(k + d, LEAST_SHARE) for d in _OFF}
     return [None, *sorted(near)]

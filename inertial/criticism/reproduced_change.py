@@ -52,7 +52,7 @@ class ReproducedChange:
 
     @property
     def confirmed(self) -> bool | None:
-        """Confirmed, not there, or (None) not decided."""
+        """Whether the fresh run confirms the effect (True) or refutes it (False); None where it does not decide."""
         if not np.isfinite(self.part) or not np.isfinite(self.error):
             return None
         if self.part > CONFIRMED * self.error:

@@ -175,7 +175,7 @@ def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
 
 
 def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
-    """The dependence that a curve beside a model is, the best of so many curves."""
+    """The unexplained dependence that a curve beside a model shows, the best of ``looks`` curves."""
     before = base.at(fit.model.noise)
     drop = max(before.rss - fit.model.space.rss, 0.0)
     log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
@@ -287,7 +287,7 @@ def _levels(values: Array) -> Array | None:
 
 
 def _alike(problem: Problem, columns: Array) -> Callable[[], Candidate]:
-    """Columns (units, n, d), the same for every axis."""
+    """Columns (units, n, d), equal on every axis."""
     each = columns if problem.lot.radial else np.repeat(columns, problem.per_unit, axis=0)
     return _columns(np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
 

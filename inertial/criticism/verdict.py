@@ -75,12 +75,12 @@ class Verdict:
 
     @property
     def problem(self) -> Problem:
-        """The series of that lot."""
+        """The series of the lot without handling errors and bad dwells."""
         return self.search.base.problem
 
     @property
     def handled(self) -> tuple[Named, ...]:
-        """Handling errors."""
+        """The handling errors that were found and corrected."""
         return tuple(self.run.handled)
 
     @property
@@ -143,7 +143,7 @@ def _bad(verdict: Verdict) -> int:
 
 
 def _causes(verdict: Verdict) -> set[str]:
-    """The driver that nothing explains, else the effects."""
+    """The driver that no effect explains if there is one, else the ids of the effects."""
     if verdict.unexplained is not None:
         return {verdict.unexplained.driver}
     return {t.effect.id for t in verdict.result.added}
@@ -215,7 +215,7 @@ def _about_its_temperature(lot: Lot, effects: Sequence[str]) -> Lot:
 
 
 def _decided(searched: SearchResult, unexplained: Unexplained | None, looks: int) -> list[float]:
-    """Log probabilities, over all looks, of what is found where the adequacy of the whole does not decide; zero for nothing."""
+    """Log probabilities, over all looks, of what is found where the adequacy of the model does not decide; zero if nothing is."""
     first = [r.log_p + float(np.log(max(looks, 1))) for r in searched.ladder[:1] if searched.added]
     return [0.0, *first, *([] if unexplained is None else [unexplained.log_p])]
 

@@ -97,7 +97,7 @@ class Handling(Effect):
         return location
 
     def mended(self, lot: "Lot", size: Array, **location: float) -> "Lot | None":
-        """The lot without it; None if only its term in the model removes it."""
+        """The lot with the error corrected; None if only its term in the model removes it."""
         return None
 
     def settled(self, lot: "Lot", size: Array, misfit: Misfit, **location: float) -> "Lot | None":
@@ -138,7 +138,7 @@ def of_outputs(lot: "Lot", change: Array) -> Array:
 
 
 def by_block(change: Array) -> Array:
-    """(units, n, m, k) as (m·units, n, k)."""
+    """Columns (units, n, m, k) by block, (m·units, n, k)."""
     units, n, m, k = change.shape
     return np.swapaxes(change, 1, 2).reshape(m * units, n, k)
 
@@ -155,7 +155,7 @@ def times(lot: "Lot") -> list[int]:
 
 
 def after(lot: "Lot", dwell: float) -> Array:
-    """One from a dwell on, (n,)."""
+    """Step (n,): 0 before a dwell, 1 from it on."""
     return (np.arange(lot.state.time.shape[1]) >= dwell).astype(np.float64)
 
 

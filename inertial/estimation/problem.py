@@ -116,8 +116,8 @@ class Problem:
         return self.lot.state.force / np.linalg.norm(self.lot.state.force, axis=-1, keepdims=True)
 
     @cached_property
-    def one(self) -> "Problem":
-        """The first unit."""
+    def first_unit(self) -> "Problem":
+        """The problem of the first unit alone."""
         return Problem(self.lot.units([0]))
 
     @property

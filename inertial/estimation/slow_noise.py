@@ -15,7 +15,7 @@ FEWEST_SAMPLES = 2 * _LINES + 1
 
 
 def slow_deviation(dwells: Sequence[Array]) -> Array:
-    """Standard deviations (m, k) of white noise that leaves as much in the mean of each of m dwells as is left there.
+    """Standard deviations (m, k) of white noise that scatters the mean of each of m dwells as its slow noise does.
 
     The mean is the line at zero of a dwell's spectrum. The lines next to it hold as much noise, and as much as the mean of what
     leaks from a vibration far above them. The scatter of the samples tells neither: an engine that shakes them averages out, the

@@ -34,7 +34,7 @@ class DwellProfile:
         return self.profile * self.loudness
 
     def louder(self, kernel: Array) -> Array:
-        """A covariance of wander (n, n), as loud as the dwells."""
+        """A covariance of wander (n, n), scaled by the loudness of the dwells."""
         if not isinstance(self.loudness, np.ndarray):
             return kernel
         return kernel * (self.loudness[:, None] * self.loudness)
