@@ -119,12 +119,12 @@ def _best(sums: Array, a: int, b: int, shortest: int) -> tuple[float, int]:
     """Squares that the best division of a piece explains, and the index where it divides; the beginning where there is none."""
     if b - a < 2 * shortest:
         return 0.0, a
-    places = np.arange(a + shortest, b - shortest + 1)
-    left, right = sums[places] - sums[a], sums[b] - sums[places]
+    cuts = np.arange(a + shortest, b - shortest + 1)
+    left, right = sums[cuts] - sums[a], sums[b] - sums[cuts]
     total = sums[b] - sums[a]
-    gain = np.sum(left**2 / (places - a)[:, None] + right**2 / (b - places)[:, None] - total**2 / (b - a), axis=1)
+    gain = np.sum(left**2 / (cuts - a)[:, None] + right**2 / (b - cuts)[:, None] - total**2 / (b - a), axis=1)
     best = int(np.argmax(gain))
-    return float(gain[best]), int(places[best])
+    return float(gain[best]), int(cuts[best])
 
 
 def _refined(sums: Array, edges: list[int], shortest: int) -> list[int]:

@@ -106,8 +106,8 @@ def _louder(loud: Flags, quick: Array) -> list[Disturbance]:
 
 def _bursts(far: Flags) -> Flags:
     """Stretches of many samples that are far off, close to each other."""
-    places, burst = np.flatnonzero(far), np.zeros(far.size, dtype=bool)
-    for group in np.split(places, np.flatnonzero(np.diff(places) > BESIDE) + 1):
+    samples, burst = np.flatnonzero(far), np.zeros(far.size, dtype=bool)
+    for group in np.split(samples, np.flatnonzero(np.diff(samples) > BESIDE) + 1):
         if group.size >= MANY:
             burst[group[0] : group[-1] + 1] = True
     return burst
@@ -185,10 +185,10 @@ def _jumps(record: Array) -> list[Disturbance]:
         change = _changes(sums, at, span)
         middle, spread = float(np.median(change)), _spread(change)
         far = np.flatnonzero(np.abs(change - middle) > JUMP * spread) if spread > 0.0 else np.zeros(0, dtype=int)
-        for places in np.split(far, np.flatnonzero(np.diff(far) > 8) + 1):
-            if not places.size:
+        for group in np.split(far, np.flatnonzero(np.diff(far) > 8) + 1):
+            if not group.size:
                 continue
-            best = int(places[np.argmax(np.abs(change[places] - middle))])
+            best = int(group[np.argmax(np.abs(change[group] - middle))])
             sample, size = int(at[best]), float(change[best] - middle)
             if taken[max(sample - span, 0) : sample + span].any() or not _sharp(sums, sample, span, size, spread):
                 continue

@@ -173,8 +173,8 @@ def curve(values: Array, knots: int) -> Array:
     distinct = np.unique(np.round(z, 6))
     if distinct.size <= 3:
         return np.stack([z**k for k in range(1, distinct.size)], axis=-1)
-    places = np.unique(np.quantile(distinct, np.linspace(0.0, 1.0, min(knots + 1, distinct.size))))
-    return np.stack([z, *natural_spline(z, places)], axis=-1)
+    at = np.unique(np.quantile(distinct, np.linspace(0.0, 1.0, min(knots + 1, distinct.size))))
+    return np.stack([z, *natural_spline(z, at)], axis=-1)
 
 
 def _pose_columns(state: State, most: int) -> Array:

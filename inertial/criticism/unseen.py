@@ -169,12 +169,12 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], effect:
     spaces : with the noise that was found, and with its white part alone
     least : RMS, g, of the part of an effect beyond the model below which it is never reported
     """
-    problem, places = model.problem, field.grids[effect.id]
+    problem, all_values = model.problem, field.grids[effect.id]
     values: list[Array] = []
     for piece in problem.pieces(effect, resting_grid(effect, problem.lot.state)):
         raw = np.sqrt(_squares(piece, problem.covariance.there) / problem.count)
         grid, p = piece.columns.shape[2:]
-        coefficients = float(p if piece.shared else problem.blocks * p) + len(places[0]) * (len(places) > 1)
+        coefficients = float(p if piece.shared else problem.blocks * p) + len(all_values[0]) * (len(all_values) > 1)
         needed = _needed(coefficients, field.looks, problem.count)
         each: list[Array] = []
         share = np.ones((grid, p))

@@ -66,13 +66,13 @@ def _suspicions(model: Model) -> list[tuple[int, tuple[int, ...]]]:
         space = model.at(Noise(noise, model.noise.scale, model.noise.prior))
         for unit in range(model.problem.lot.state.time.shape[0]):
             p, py = _projector(model, Noise(noise, model.noise.scale, model.noise.prior), unit)
-            for size, drop, places in _drops(p, py):
+            for size, drop, dwells in _drops(p, py):
                 left = np.maximum(space.rss - drop, 1e-300) / max(space.dof - size, 1)
                 log_p = log_f_tail(drop / size / left, size, max(space.dof - size, 1))
                 order = np.argsort(log_p)[:_TRIED]
                 for k in order.tolist():
                     if log_p[k] + _looks(model, size) < 0.0:
-                        chosen[unit, places[k]] = None
+                        chosen[unit, dwells[k]] = None
     return list(chosen)
 
 

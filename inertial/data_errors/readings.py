@@ -186,13 +186,13 @@ def find_split(force: Array, output: Array) -> Split | None:
         return None
     f, y = force[there], output[there]
     total = _plain_fit(f, y)[1]
-    places = np.arange(_LEAST, there.size - _LEAST)
-    if _far_from_split(f, y, places):
+    cuts = np.arange(_LEAST, there.size - _LEAST)
+    if _far_from_split(f, y, cuts):
         return None
-    coarse = places[:: max(1, places.size // 24)]
+    coarse = cuts[:: max(1, cuts.size // 24)]
     errors = [_plain_fit(f[:p], y[:p])[1] + _plain_fit(f[p:], y[p:])[1] for p in coarse]
     centre = int(coarse[int(np.argmin(errors))])
-    near = places[np.abs(places - centre) <= max(1, places.size // 24)]
+    near = cuts[np.abs(cuts - centre) <= max(1, cuts.size // 24)]
     errors = [_plain_fit(f[:p], y[:p])[1] + _plain_fit(f[p:], y[p:])[1] for p in near]
     best = int(near[int(np.argmin(errors))])
     before, after = _plain_fit(f[:best], y[:best])[0], _plain_fit(f[best:], y[best:])[0]
@@ -200,14 +200,14 @@ def find_split(force: Array, output: Array) -> Split | None:
     return Split(int(there[best]), before, after) if min(errors) < _BETTER * total and apart else None
 
 
-def _far_from_split(force: Array, output: Array, places: Places) -> bool:
+def _far_from_split(force: Array, output: Array, cuts: Places) -> bool:
     """Whether no split of the dwells (k,) comes near to what is needed, by the products of all dwells up to each."""
     x = design(force)
     left = output - x @ np.linalg.lstsq(x, output, rcond=1e-9)[0]
     both = np.concatenate([x, left], axis=-1)
     before = np.cumsum(both[:, :, None] * both[:, None, :], axis=0)
-    squares = np.zeros(len(places))
-    for gram in (before[places - 1], before[-1] - before[places - 1]):
+    squares = np.zeros(len(cuts))
+    for gram in (before[cuts - 1], before[-1] - before[cuts - 1]):
         values, vectors = np.linalg.eigh(gram[:, :4, :4])
         along = np.swapaxes(vectors, -1, -2) @ gram[:, :4, 4:]
         known = values > _FIXED * values[:, -1:]

@@ -163,12 +163,12 @@ def _gather(
             labels = lot.units if name == UNIT else lot.levels[name]
             for label in dict.fromkeys(labels):
                 here = np.array([other == label for other in labels])
-                mine = by_unit[here].sum(axis=0)
+                of_level = by_unit[here].sum(axis=0)
                 score = left[here].sum(axis=0) / within
-                information = mine * (1.0 - mine / total) / within
+                information = of_level * (1.0 - of_level / total) / within
                 of.inside += float(information.sum())
                 if name not in INSIDE_ONLY:  # and what the lot has in common
-                    share = mine / total
+                    share = of_level / total
                     score = score + share * sums / noise
                     common = share**2 * info / noise
                     information = information + common

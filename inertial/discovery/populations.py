@@ -87,11 +87,11 @@ def _fitted(z: Array) -> tuple[Array, Array, Array]:
         for _ in range(_STEPS):
             parts = _parts(z, weights, means, widths)
             total = np.logaddexp(*parts)
-            mine = np.exp(parts - total)
-            counts = np.maximum(mine.sum(axis=1), 2.0)
-            weights, means = counts / counts.sum(), mine @ z / counts
+            shares = np.exp(parts - total)
+            counts = np.maximum(shares.sum(axis=1), 2.0)
+            weights, means = counts / counts.sum(), shares @ z / counts
             # a floor that is added would widen both at each step
-            widths = np.maximum(np.sqrt((mine * (z - means[:, None]) ** 2).sum(axis=1) / counts), least)
+            widths = np.maximum(np.sqrt((shares * (z - means[:, None]) ** 2).sum(axis=1) / counts), least)
             now = float(np.sum(total))
             if now - before < 1e-4:
                 break

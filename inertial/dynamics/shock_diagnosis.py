@@ -145,10 +145,10 @@ class Design:
         """The waveform of a shock's reference after all effects."""
         key: tuple[object, ...] = (number,)
         for name, chosen in zip(self.effects, self._parameters_of, strict=True):
-            mine = values[chosen]
-            key = (*key, name, *mine.tolist())
+            of_effect = values[chosen]
+            key = (*key, name, *of_effect.tolist())
             if key not in self._waves:
-                self._waves[key] = EFFECTS[name].changed(wave, self.record.rate_hz, mine)
+                self._waves[key] = EFFECTS[name].changed(wave, self.record.rate_hz, of_effect)
             wave = self._waves[key]
         return wave
 

@@ -229,9 +229,9 @@ def _maximum(time: Array, response: Array, error: Array, after: float, rise: flo
     design = np.vander((time[rows] - near) / width, 5) / error[rows, None]
     covariance = np.linalg.inv(design.T @ design)
     c = covariance @ (design.T @ (response[rows] / error[rows]))
-    places = np.linspace(-0.8, 0.8, 161)
-    curve = np.vander(places, 5)
+    fine = np.linspace(-0.8, 0.8, 161)
+    curve = np.vander(fine, 5)
     k = int(np.argmax(curve @ c))
-    bend = float(np.polyval(np.polyder(c, 2), places[k]))
+    bend = float(np.polyval(np.polyder(c, 2), fine[k]))
     value = float(curve[k] @ c) - 0.5 * bend * blur / width**2
     return value, float(np.sqrt(curve[k] @ covariance @ curve[k]))

@@ -253,15 +253,15 @@ class Covariance:
                 out[some] = whitener.back(rows[some])
         return out
 
-    def solved(self, columns: Array, places: Places, shares: Shares) -> Iterator[tuple[Places, Places, Array]]:
+    def solved(self, columns: Array, column_of: Places, shares: Shares) -> Iterator[tuple[Places, Places, Array]]:
         """V⁻¹ times columns, for white noise of variance one: blocks that share a whitener, their columns, and rows (k, n).
 
         Parameters
         ----------
-        columns : (rows, n); places : (blocks, p), the columns of each block
+        columns : (rows, n); column_of : (blocks, p), the columns of each block
         """
         for members, whitener in self._by_whitener(shares):
-            distinct = np.unique(places[members])
+            distinct = np.unique(column_of[members])
             yield members, distinct, whitener.back(whitener.rows(columns[distinct]))
 
     def precision(self, noise: Noise) -> Array:

@@ -261,7 +261,7 @@ class Problem:
     ) -> Iterator[Candidate]:
         """The candidate of an effect in pieces of its grid, small enough to limit the memory for large lots."""
         if isinstance(effect, Handling):
-            yield from self._places(effect, grid)
+            yield from self._at_locations(effect, grid)
             return
         size, begin = self.at_a_time, 0
         while begin < len(grid):
@@ -271,7 +271,7 @@ class Problem:
             if made.rows is not None:
                 size = max(1, _PIECE // made.columns[:, :, 0].size)
 
-    def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
+    def _at_locations(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
         """Columns of an alternative at its locations, unit after unit, no more at a time than a piece has room for."""
         if grid and ("unit" not in grid[0] or "other" in grid[0]):
             alike = len(effect.change(self.lot, self.slope, **on_axis(grid[0], 0))) == 1
@@ -279,19 +279,19 @@ class Problem:
             for start in range(0, len(grid), size):
                 yield self._together(effect, grid[start : start + size])
             return
-        by_unit = [list(places) for _, places in groupby(grid, key=lambda values: values["unit"])]
-        for places, alike in groupby(by_unit, key=_without_unit):
+        by_unit = [list(locations) for _, locations in groupby(grid, key=lambda values: values["unit"])]
+        for locations, alike in groupby(by_unit, key=_without_unit):
             units = np.array([int(on_axis({"unit": of_unit[0]["unit"]}, 0)["unit"]) for of_unit in alike])
-            size = max(1, _PIECE // (len(self.axes) * self.n * _WIDEST * len(places)))
-            yield from self._of_units(effect, units, [dict(location) for location in places], size)
+            size = max(1, _PIECE // (len(self.axes) * self.n * _WIDEST * len(locations)))
+            yield from self._of_units(effect, units, [dict(location) for location in locations], size)
 
-    def _of_units(self, effect: Handling, units: Places, places: Sequence[Values], size: int) -> Iterator[Candidate]:
+    def _of_units(self, effect: Handling, units: Places, locations: Sequence[Values], size: int) -> Iterator[Candidate]:
         """Columns of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
-        key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
+        key = (effect.id, units.size, int(units[0]), len(locations), *locations[0].items(), *locations[-1].items())
 
         def made() -> Candidate:
             columns = np.stack(
-                [of_outputs(self.lot, effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0))) for p in places],
+                [of_outputs(self.lot, effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0))) for p in locations],
                 axis=3,
             )
             few, n, m, g, k = columns.shape
@@ -308,12 +308,12 @@ class Problem:
             blocks = blocks_of_units(some, len(self.axes))
             yield replace(candidate, columns=candidate.columns[blocks], units=some, key=(*key, start, size))
 
-    def _together(self, effect: Handling, places: Sequence[Values]) -> Candidate:
+    def _together(self, effect: Handling, locations: Sequence[Values]) -> Candidate:
         """Columns of an alternative of the whole lot at some locations."""
-        key = (effect.id, len(places), *places[0].items(), *places[-1].items())
+        key = (effect.id, len(locations), *locations[0].items(), *locations[-1].items())
 
         def made() -> Candidate:
-            changes = [of_outputs(self.lot, effect.change(self.lot, self.slope, **on_axis(p, 0))) for p in places]
+            changes = [of_outputs(self.lot, effect.change(self.lot, self.slope, **on_axis(p, 0))) for p in locations]
             units = self.lot.state.time.shape[0]
             rows = np.tile(np.arange(len(self.axes)), units) if all(len(f) == 1 for f in changes) else None
             if rows is None:
@@ -323,6 +323,6 @@ class Problem:
         return self._stored(key, made)
 
 
-def _without_unit(places: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:
+def _without_unit(locations: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:
     """Locations in a unit as a key, without the unit."""
-    return tuple(tuple((name, value) for name, value in location.items() if name != "unit") for location in places)
+    return tuple(tuple((name, value) for name, value in location.items() if name != "unit") for location in locations)

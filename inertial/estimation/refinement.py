@@ -240,15 +240,15 @@ def _profile(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -
     fitted = on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
     coarse = np.append(np.linspace(low, high, _PLACES), fitted)
 
-    def drop(places: Array) -> Array:
-        values = np.array([_off_scale(parameter, float(v)) for v in places])
+    def drop(scaled: Array) -> Array:
+        values = np.array([_off_scale(parameter, float(v)) for v in scaled])
         return _varied(space, problem, term, parameter, values).drop
 
     first = drop(coarse)
     centre, cell_ = coarse[int(np.argmax(first))], (high - low) / (_PLACES - 1)
     fine = np.clip(np.linspace(centre - cell_, centre + cell_, _PLACES), low, high)
-    places = np.concatenate([coarse, fine])
-    values = np.array([_off_scale(parameter, float(v)) for v in places])
+    scaled = np.concatenate([coarse, fine])
+    values = np.array([_off_scale(parameter, float(v)) for v in scaled])
     return values, np.concatenate([first, drop(fine)])
 
 

@@ -142,14 +142,14 @@ class ShareStatistics:
         """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + q + 1)."""
         blocks = self.problem.blocks
         few: list[Array] = []
-        places: list[Places] = []
+        column_of: list[Places] = []
         count = 0
         for column in np.swapaxes(self._rows, 0, 1):
             rows = shared_rows(column, self.problem.per_unit)
             few.append(column if rows is None else column[np.unique(rows, return_index=True)[1]])
-            places.append(count + (np.arange(blocks) if rows is None else rows))
+            column_of.append(count + (np.arange(blocks) if rows is None else rows))
             count += len(few[-1])
-        return np.concatenate(few), np.stack(places, axis=1)
+        return np.concatenate(few), np.stack(column_of, axis=1)
 
     def _products(self, shares: Shares) -> Array:
         """Products (blocks, r + q + 1, r + q + 1) of the columns and the measurements with each other."""
@@ -165,10 +165,10 @@ class ShareStatistics:
 
     def _made(self, shares: Shares) -> Array:
         covariance = self.problem.covariance
-        columns, places = self._distinct
-        out = np.empty((self.problem.blocks, places.shape[1], places.shape[1]))
-        for members, distinct, rows in covariance.solved(columns, places, shares):
-            each = np.searchsorted(distinct, places[members])
+        columns, column_of = self._distinct
+        out = np.empty((self.problem.blocks, column_of.shape[1], column_of.shape[1]))
+        for members, distinct, rows in covariance.solved(columns, column_of, shares):
+            each = np.searchsorted(distinct, column_of[members])
             few = max(PIECE // (each.shape[1] * self.problem.n), 1)
             for some in (slice(start, start + few) for start in range(0, members.size, few)):
                 out[members[some]] = rows[each[some]] @ np.swapaxes(self._rows[members[some]], -1, -2)

@@ -215,7 +215,7 @@ class Space:
         along = np.swapaxes(vectors, -1, -2) @ (found.inside / size[..., None])
         return self._gain_along(along * inverse_roots(values, SEEN**2)[..., None], values > SEEN**2)
 
-    def gain_of_dwells(self, columns: Array, places: Places) -> Gain:
+    def gain_of_dwells(self, columns: Array, dwells: Places) -> Gain:
         """Gain of columns of one dwell each, for every dwell separately; all blocks share their coefficients.
 
         With P as in :mod:`inertial.criticism.left_out` a column t at dwell k has the product t²·P_kk with itself and t·(Py)_k
@@ -223,7 +223,7 @@ class Space:
 
         Parameters
         ----------
-        columns : (blocks, n, p), of every dwell; places : (grid,), the dwells
+        columns : (blocks, n, p), of every dwell; dwells : (grid,)
         """
         n, p = columns.shape[1:]
         inside, left = np.zeros((n, p, self.targets.shape[-1])), np.zeros((n, p, p))
@@ -239,7 +239,7 @@ class Space:
             left += np.einsum("bnp,bnr,bn->npr", columns[members], columns[members], diagonal)
             size += np.einsum("bnp,bn->np", columns[members] ** 2, precision)
         size = np.sqrt(np.where(size > 0.0, size, 1.0))
-        return self._solved((left / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places])
+        return self._solved((left / size[:, :, None] / size[:, None, :])[dwells], (inside / size[..., None])[dwells])
 
     def _gain_along(self, along: Array, seen: Flags) -> Gain:
         rank = seen.sum(axis=(0, 2))

@@ -156,7 +156,7 @@ class Series:
         if coarse[0, 0] - coarse.min() < _CHARGE:
             return 0.0, 0.0
         rows, columns = np.nonzero(coarse - coarse.min() < _FAR)
-        flicker, walk = (_around(shares[places]) for places in (rows, columns))
+        flicker, walk = (_around(shares[points]) for points in (rows, columns))
         deviance = self.deviances(flicker**2, walk**2)
         rows, columns = np.nonzero(deviance - deviance.min() < _FAR)
         flicker, walk = _between(flicker[rows] ** 2), _between(walk[columns] ** 2)

@@ -61,9 +61,9 @@ def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     left, skipped = noise.left, values.size - noise.left.size
     if left.size < 2 * FEWEST or not noise.sigma > 0.0:
         return []
-    places = sorted(_segment(left, (0, left.size), noise, level))
+    cuts = sorted(_segment(left, (0, left.size), noise, level))
     out: list[ChangePoint] = []
-    for low, cut, high in zip([0, *places], places, [*places[1:], left.size], strict=False):
+    for low, cut, high in zip([0, *cuts], cuts, [*cuts[1:], left.size], strict=False):
         offset = _best(left[low:high])
         out.append(_described(left[low:high], low + skipped, cut - low if offset is None else offset, noise))
     return out

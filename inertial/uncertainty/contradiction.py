@@ -79,15 +79,15 @@ def common_evidence(columns: Array, changes: Array, left: Array, covariance: Arr
     return CommonEvidence(information, projection)
 
 
-def without(evidence: CommonEvidence, places: Places) -> CommonEvidence:
+def without(evidence: CommonEvidence, taken_out: Places) -> CommonEvidence:
     """The evidence on the other influences, these being free: what they can imitate is taken out."""
-    if not places.size:
+    if not taken_out.size:
         return evidence
-    others = np.setdiff1d(np.arange(evidence.projection.size), places)
-    inverse = np.linalg.pinv(evidence.information[np.ix_(places, places)], hermitian=True)
-    turn = evidence.information[np.ix_(others, places)] @ inverse
-    information = evidence.information[np.ix_(others, others)] - turn @ evidence.information[np.ix_(places, others)]
-    return CommonEvidence(information, evidence.projection[others] - turn @ evidence.projection[places])
+    others = np.setdiff1d(np.arange(evidence.projection.size), taken_out)
+    inverse = np.linalg.pinv(evidence.information[np.ix_(taken_out, taken_out)], hermitian=True)
+    turn = evidence.information[np.ix_(others, taken_out)] @ inverse
+    information = evidence.information[np.ix_(others, others)] - turn @ evidence.information[np.ix_(taken_out, others)]
+    return CommonEvidence(information, evidence.projection[others] - turn @ evidence.projection[taken_out])
 
 
 def sizes(
@@ -105,10 +105,10 @@ def sizes(
         scaled[:, groups[name]] *= factor
     total = np.eye(len(value)) + scaled @ scaled.T
     out = []
-    for name, places in groups.items():
-        of_group = columns[:, places]
+    for name, members in groups.items():
+        of_group = columns[:, members]
         if name not in (known or {}) and np.sum(of_group**2) > LEAST_INFORMATION:
-            out.append((name, *_parts(total - scaled[:, places] @ scaled[:, places].T, of_group, value)))
+            out.append((name, *_parts(total - scaled[:, members] @ scaled[:, members].T, of_group, value)))
     return [_size(name, strength, part, LEVEL / len(out)) for name, strength, part in out]
 
 
@@ -137,14 +137,14 @@ def probability(looked: Sequence[Size], named: Size | None = None) -> float:
     return min(1.0, len(looked) * least)
 
 
-def beyond(evidence: CommonEvidence, places: Places, groups: Mapping[str, Places], found: Sequence[Size]) -> float:
+def beyond(evidence: CommonEvidence, zero: Places, groups: Mapping[str, Places], found: Sequence[Size]) -> float:
     """Probability of the residual along some influences that are taken to be zero, groups being as large as they were found."""
     columns, value = _independent(evidence)
     rest = columns.copy()
     for size in found:
         rest[:, groups[size.name]] *= size.factor
-    rest = np.delete(rest, places, axis=1)
-    strength, part = _parts(np.eye(len(value)) + rest @ rest.T, columns[:, places], value)
+    rest = np.delete(rest, zero, axis=1)
+    strength, part = _parts(np.eye(len(value)) + rest @ rest.T, columns[:, zero], value)
     return _above(float(np.sum(strength * part**2)), strength)
 
 

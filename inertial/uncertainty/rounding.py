@@ -63,9 +63,9 @@ def short(value: float | None, digits: int = 3) -> str:
         return ""
     if value == 0.0:
         return "0"
-    places = digits - 1 - math.floor(math.log10(abs(value)))
-    if -3 <= places <= 6:
-        return f"{round(value, places):.{max(places, 0)}f}"
+    decimals = digits - 1 - math.floor(math.log10(abs(value)))
+    if -3 <= decimals <= 6:
+        return f"{round(value, decimals):.{max(decimals, 0)}f}"
     return f"{value:.{digits - 1}e}"
 
 

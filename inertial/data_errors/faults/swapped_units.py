@@ -22,11 +22,11 @@ def swapped_units(readings: Readings) -> Iterator[Fault]:
     for dwell in np.flatnonzero(away).tolist():
         for pair in _exchanges(readings, dwell):
             exchanged.setdefault(pair, []).append(dwell)
-    for (first, second), places in exchanged.items():
-        if len(places) >= max(3, n // 20):
+    for (first, second), dwells in exchanged.items():
+        if len(dwells) >= max(3, n // 20):
             for unit, partner in ((first, second), (second, first)):
-                evidence = f"{len(places)} dwells have the bias and scale of unit {{unit[{partner}]}}"
-                yield Fault("units_swapped", unit, tuple(places), evidence)
+                evidence = f"{len(dwells)} dwells have the bias and scale of unit {{unit[{partner}]}}"
+                yield Fault("units_swapped", unit, tuple(dwells), evidence)
 
 
 def _exchanges(readings: Readings, dwell: int) -> Iterator[tuple[int, int]]:
