@@ -28,7 +28,7 @@ def own_shares(runs: int, first: int) -> Iterator[str]:
     for told, kinds in worlds.items():
         noises = [run_of(world, SEED + first + seed).model().noise for world in kinds for seed in range(runs)]
         axes = sum(noise.scale.size for noise in noises)
-        yield f"{told}: {rate(sum(len(noise.shares.own) for noise in noises), axes)} with shares of their own"
+        yield f"{told}: {rate(sum(len(noise.shares.by_block) for noise in noises), axes)} with shares of their own"
 
 
 def louder(runs: int, first: int) -> Iterator[str]:

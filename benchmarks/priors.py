@@ -108,7 +108,7 @@ class Measured:
             own = self.coefficients[k : k + LOT], self.covariance[k : k + LOT]
             priors.append(judged(family, self.effects, *own, self.serials[k : k + LOT]))
             fits.append(combined(*own, priors[-1].mean, priors[-1].precision))
-        names = ("coefficients", "covariance", "kept", "share")
+        names = ("coefficients", "covariance", "of_fit", "share")
         both = Combined(*(np.concatenate([getattr(fit, name) for fit in fits]) for name in names))
         return priors, both, both.coefficients - self.coefficients + self.off
 

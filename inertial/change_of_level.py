@@ -41,8 +41,8 @@ def neighbour_noise(x: ArrayLike) -> Array:
     steps = np.abs(np.diff(np.asarray(x, dtype=np.float64), axis=0))
     # of coarse digits most steps may be zero: their mean square, with the largest tenth left out, is none
     robust = np.median(steps, axis=0) / (0.6745 * np.sqrt(2.0))
-    kept = np.sort(steps, axis=0)[: max(1, int(0.9 * len(steps)))]
-    return np.maximum(robust, np.sqrt(np.mean(kept**2, axis=0) / 2.0))
+    smaller = np.sort(steps, axis=0)[: max(1, int(0.9 * len(steps)))]
+    return np.maximum(robust, np.sqrt(np.mean(smaller**2, axis=0) / 2.0))
 
 
 def several_levels(x: ArrayLike) -> int:
@@ -90,11 +90,11 @@ def levels(x: ArrayLike, count: int | None, *, shortest: int = _SHORTEST) -> Lev
         sums, n, (count or _MOST) - 1, shortest, 3.0 * np.log(n) * data.shape[1] if count is None else -1.0
     )
     boundaries = _refined(sums, [0, *sorted(boundaries), n], shortest)
-    whole = float(np.sum(scaled**2))
+    total = float(np.sum(scaled**2))
     edges = np.array(boundaries)
     pieces = sums[edges[1:]] - sums[edges[:-1]]
     between = float(np.sum(pieces**2 / np.diff(edges)[:, None]))
-    return Levels(edges[:-1], edges[1:], between / whole if whole > 0.0 else 0.0)
+    return Levels(edges[:-1], edges[1:], between / total if total > 0.0 else 0.0)
 
 
 def _divided(sums: Array, n: int, most: int, shortest: int, penalty: float) -> list[int]:
@@ -102,37 +102,37 @@ def _divided(sums: Array, n: int, most: int, shortest: int, penalty: float) -> l
     cuts: list[int] = []
 
     def offer(a: int, b: int) -> None:
-        gain, place = _best(sums, a, b, shortest)
-        if place > a and gain > penalty:
-            heapq.heappush(queue, (-gain, place, a, b))
+        gain, cut = _best(sums, a, b, shortest)
+        if cut > a and gain > penalty:
+            heapq.heappush(queue, (-gain, cut, a, b))
 
     offer(0, n)
     while queue and len(cuts) < most:
-        _, place, a, b = heapq.heappop(queue)
-        cuts.append(place)
-        offer(a, place)
-        offer(place, b)
+        _, cut, a, b = heapq.heappop(queue)
+        cuts.append(cut)
+        offer(a, cut)
+        offer(cut, b)
     return cuts
 
 
 def _best(sums: Array, a: int, b: int, shortest: int) -> tuple[float, int]:
-    """Squares that the best division of a piece explains, and its place; the piece's beginning where there is none."""
+    """Squares that the best division of a piece explains, and the index where it divides; the beginning where there is none."""
     if b - a < 2 * shortest:
         return 0.0, a
-    places = np.arange(a + shortest, b - shortest + 1)
-    left, right = sums[places] - sums[a], sums[b] - sums[places]
-    whole = sums[b] - sums[a]
-    gain = np.sum(left**2 / (places - a)[:, None] + right**2 / (b - places)[:, None] - whole**2 / (b - a), axis=1)
+    cuts = np.arange(a + shortest, b - shortest + 1)
+    left, right = sums[cuts] - sums[a], sums[b] - sums[cuts]
+    total = sums[b] - sums[a]
+    gain = np.sum(left**2 / (cuts - a)[:, None] + right**2 / (b - cuts)[:, None] - total**2 / (b - a), axis=1)
     best = int(np.argmax(gain))
-    return float(gain[best]), int(places[best])
+    return float(gain[best]), int(cuts[best])
 
 
 def _refined(sums: Array, edges: list[int], shortest: int) -> list[int]:
     for _ in range(3):
         before = list(edges)
         for k in range(1, len(edges) - 1):
-            gain, place = _best(sums, edges[k - 1], edges[k + 1], shortest)
-            edges[k] = place if gain > 0.0 else edges[k]
+            gain, cut = _best(sums, edges[k - 1], edges[k + 1], shortest)
+            edges[k] = cut if gain > 0.0 else edges[k]
         if edges == before:
             break
     return edges

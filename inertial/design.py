@@ -18,8 +18,8 @@ Values = Mapping[str, Mapping[str, Any]]
 
 def on_axis(values: Values, effect: str, axis: int = 0) -> dict[str, float]:
     """The values of an effect that hold for one sensor axis."""
-    own = values.get(effect)
-    return {name: v[axis] if isinstance(v, tuple) else v for name, v in own.items()} if own else {}
+    of_effect = values.get(effect)
+    return {name: v[axis] if isinstance(v, tuple) else v for name, v in of_effect.items()} if of_effect else {}
 
 
 def split(names: Sequence[str]) -> tuple[list[SensorEffect], list[StationEffect]]:
@@ -49,7 +49,7 @@ def starting_values(effects: Sequence[AnyEffect], state: State) -> dict[str, dic
 def carried_over(values: Values) -> dict[str, dict[str, Any]]:
     """The values that hold in another run, too: without the state in which a run began, which is taken as at rest there."""
     of_run = {name: {p.name for p in catalogue.get(name).nonlinear if p.of_run} for name in values}
-    return {name: {k: v for k, v in own.items() if k not in of_run[name]} for name, own in values.items()}
+    return {name: {k: v for k, v in of_effect.items() if k not in of_run[name]} for name, of_effect in values.items()}
 
 
 def local_columns(effects: Sequence[SensorEffect], state: State, values: Values) -> Array:
@@ -62,10 +62,10 @@ def local_columns(effects: Sequence[SensorEffect], state: State, values: Values)
     design = np.empty((*batch, len(axes), sum(c.shape[-1] for c in axes[0]), n))
     for axis, columns in enumerate(axes):
         start = 0
-        for own in columns:
-            for column in range(own.shape[-1]):
-                design[..., axis, start + column, :] = own[..., column]
-            start += own.shape[-1]
+        for of_effect in columns:
+            for column in range(of_effect.shape[-1]):
+                design[..., axis, start + column, :] = of_effect[..., column]
+            start += of_effect.shape[-1]
     return np.swapaxes(design, -1, -2)
 
 
@@ -110,7 +110,7 @@ def grid_of(effect: AnyEffect, state: State) -> list[dict[str, float]]:
 
 
 def resting_grid(effect: AnyEffect, state: State) -> list[dict[str, float]]:
-    """The same for a run that begins at rest: what a plan can show may not rest on the state that a run happens to begin in."""
+    """Starting values for a run that begins at rest: what a plan can show may not depend on the state that a run begins in."""
     return [values for values in grid_of(effect, state) if at_rest(effect, values)]
 
 

@@ -63,11 +63,13 @@ def disturbances(record: Array) -> list[Disturbance]:
     spread = max(_spread(quick), _spread(np.diff(record)) / np.sqrt(2.0))
     far = np.abs(quick) > FAR * spread if spread > 0.0 else np.zeros(record.size, dtype=bool)  # 0: coarse digits
     rest = np.where(far, 0.0, quick)
-    found = [Disturbance("stuck", one.start, one.stop, one.count, 0.0) for one in frozen(record[:, None])]
+    found = [
+        Disturbance("stuck", stretch.start, stretch.stop, stretch.count, 0.0) for stretch in frozen(record[:, None])
+    ]
     found += _louder(_bursts(far) | _loud(rest), quick)
     within: Flags = np.zeros(record.size, dtype=bool)
-    for one in found:
-        within[max(one.start - BESIDE, 0) : one.stop + BESIDE] = True
+    for disturbance in found:
+        within[max(disturbance.start - BESIDE, 0) : disturbance.stop + BESIDE] = True
     rows = np.flatnonzero(far & ~within)
     if float(np.sum(quick[rows] ** 2)) > MATERIAL * float(np.sum(rest**2)):
         worst = float(quick[rows[np.argmax(np.abs(quick[rows]))]])
@@ -82,10 +84,11 @@ def disturbances(record: Array) -> list[Disturbance]:
 def disturbance_texts(found: Sequence[Disturbance], rate_hz: float, unit: str) -> list[str]:
     """What is said of the disturbances of a channel sampled at ``rate_hz``, a text for each kind; ``unit``: of the record."""
     texts: list[str] = []
-    for kind, own in (
-        (kind, [one for one in found if one.kind == kind]) for kind in dict.fromkeys(one.kind for one in found)
+    for kind, of_kind in (
+        (kind, [disturbance for disturbance in found if disturbance.kind == kind])
+        for kind in dict.fromkeys(disturbance.kind for disturbance in found)
     ):
-        first, more = own[0], f" (and {len(own) - 1} more)" if len(own) > 1 else ""
+        first, more = of_kind[0], f" (and {len(of_kind) - 1} more)" if len(of_kind) > 1 else ""
         start, stop, size = first.start / rate_hz, first.stop / rate_hz, f"{first.size:+.3g} {unit}".strip()
         texts.append(
             {
@@ -110,10 +113,10 @@ def _louder(loud: Flags, quick: Array) -> list[Disturbance]:
 
 def _bursts(far: Flags) -> Flags:
     """Stretches of many samples that are far off, close to each other."""
-    places, burst = np.flatnonzero(far), np.zeros(far.size, dtype=bool)
-    for own in np.split(places, np.flatnonzero(np.diff(places) > BESIDE) + 1):
-        if own.size >= MANY:
-            burst[own[0] : own[-1] + 1] = True
+    samples, burst = np.flatnonzero(far), np.zeros(far.size, dtype=bool)
+    for group in np.split(samples, np.flatnonzero(np.diff(samples) > BESIDE) + 1):
+        if group.size >= MANY:
+            burst[group[0] : group[-1] + 1] = True
     return burst
 
 
@@ -132,9 +135,9 @@ def _loud(quick: Array) -> Flags:
     power = (quick[: count * size].reshape(count, size) ** 2).mean(axis=1)
     usual = float(np.median(power))
     scatter = max(_spread(power), usual * np.sqrt(2.0 / size))
-    own = (power > LOUDER * usual) & (power - usual > FAR * scatter)
-    if float(np.sum(power[own] - usual)) > MATERIAL * count * usual:
-        for first, last in zip(*runs_of(own), strict=True):
+    louder = (power > LOUDER * usual) & (power - usual > FAR * scatter)
+    if float(np.sum(power[louder] - usual)) > MATERIAL * count * usual:
+        for first, last in zip(*runs_of(louder), strict=True):
             high = float(power[first:last].max())
             # of each sample, by how much more likely it is of the louder noise than of the usual one
             gain = 0.5 * (quick**2 * (1.0 / usual - 1.0 / high) - np.log(high / usual))
@@ -145,7 +148,7 @@ def _loud(quick: Array) -> Flags:
     return loud
 
 
-def _brief(quick: Array, whole: float) -> list[Disturbance]:
+def _brief(quick: Array, total: float) -> list[Disturbance]:
     """Short bursts that come again, as one disturbance, from a record's quick part (n,) without what is told otherwise.
 
     The cube root of a mean square is nearly normal (Wilson and Hilferty), so that its own spread over the record tells what is
@@ -153,7 +156,7 @@ def _brief(quick: Array, whole: float) -> list[Disturbance]:
 
     Parameters
     ----------
-    whole : sum of the squares of the record's noise
+    total : sum of the squares of the record's noise
     """
     inside: Flags = np.zeros(quick.size, dtype=bool)
     most = CAPPED * _spread(quick)
@@ -163,8 +166,8 @@ def _brief(quick: Array, whole: float) -> list[Disturbance]:
             break
         root = np.cbrt(np.convolve(capped**2, np.full(size, 1.0 / size), "valid"))
         spread = _spread(root)
-        for place in np.flatnonzero(root - np.median(root) > RARE * spread) if spread > 0.0 else ():
-            inside[place : place + size] = True
+        for start in np.flatnonzero(root - np.median(root) > RARE * spread) if spread > 0.0 else ():
+            inside[start : start + size] = True
     starts, stops = runs_of(inside)
     if not starts.size:
         return []
@@ -172,7 +175,7 @@ def _brief(quick: Array, whole: float) -> list[Disturbance]:
     if np.count_nonzero(apart) < FEWEST_BURSTS:
         return []
     largest = float(quick[inside][np.argmax(np.abs(quick[inside]))])
-    material = float(np.sum(quick[inside] ** 2)) > MATERIAL * whole
+    material = float(np.sum(quick[inside] ** 2)) > MATERIAL * total
     return [Disturbance("bursts", int(starts[0]), int(stops[-1]), int(np.count_nonzero(apart)), largest, material)]
 
 
@@ -189,31 +192,31 @@ def _jumps(record: Array) -> list[Disturbance]:
         change = _changes(sums, at, span)
         middle, spread = float(np.median(change)), _spread(change)
         far = np.flatnonzero(np.abs(change - middle) > JUMP * spread) if spread > 0.0 else np.zeros(0, dtype=int)
-        for places in np.split(far, np.flatnonzero(np.diff(far) > 8) + 1):
-            if not places.size:
+        for group in np.split(far, np.flatnonzero(np.diff(far) > 8) + 1):
+            if not group.size:
                 continue
-            best = int(places[np.argmax(np.abs(change[places] - middle))])
-            place, size = int(at[best]), float(change[best] - middle)
-            if taken[max(place - span, 0) : place + span].any() or not _sharp(sums, place, span, size, spread):
+            best = int(group[np.argmax(np.abs(change[group] - middle))])
+            sample, size = int(at[best]), float(change[best] - middle)
+            if taken[max(sample - span, 0) : sample + span].any() or not _sharp(sums, sample, span, size, spread):
                 continue
-            taken[max(place - span, 0) : place + span] = True
-            found.append((abs(size) / spread, Disturbance("jump", place, place, 1, size)))
+            taken[max(sample - span, 0) : sample + span] = True
+            found.append((abs(size) / spread, Disturbance("jump", sample, sample, 1, size)))
         span *= 2
-    return [one for _, one in sorted(found, key=lambda pair: -pair[0])]
+    return [jump for _, jump in sorted(found, key=lambda pair: -pair[0])]
 
 
 def _changes(sums: Array, at: Index, span: int) -> Array:
-    """Mean of ``span`` samples from each place on, less that of as many before it."""
+    """Mean of ``span`` samples from each index on, less that of as many before it."""
     return (sums[at + span] - 2.0 * sums[at] + sums[at - span]) / span
 
 
-def _sharp(sums: Array, place: int, span: int, size: float, spread: float) -> bool:
+def _sharp(sums: Array, sample: int, span: int, size: float, spread: float) -> bool:
     """Whether a change has hardly grown over four times the span."""
-    wide = min(4 * span, place, sums.size - 1 - place)
+    wide = min(4 * span, sample, sums.size - 1 - sample)
     if wide < 2 * span:
         return False
-    whole = float(_changes(sums, np.array([place]), wide)[0])
-    return abs(whole) < SHARP * abs(size) * (wide / span) / 4.0 + 3.0 * spread
+    change = float(_changes(sums, np.array([sample]), wide)[0])
+    return abs(change) < SHARP * abs(size) * (wide / span) / 4.0 + 3.0 * spread
 
 
 def _settling(record: Array) -> list[Disturbance]:

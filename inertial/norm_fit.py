@@ -178,8 +178,8 @@ class _Work:
         """Change (units, 3, p) of the coefficients by the linear model about them."""
         white, left = self.white(self.rows(theta)[0]), self.white(self.left(theta)[..., None])[..., 0]
         step = np.zeros_like(theta)
-        for unit, (own, target) in enumerate(zip(white, left, strict=True)):
-            step[unit][self.free] = -self._solved(own, target)
+        for unit, (rows, target) in enumerate(zip(white, left, strict=True)):
+            step[unit][self.free] = -self._solved(rows, target)
         return step
 
     def _solved(self, rows: Array, target: Array) -> Array:
@@ -216,31 +216,37 @@ class _Work:
         chi2 = np.sum(white_left**2, axis=-1)
         covariance = np.zeros((*theta.shape, theta.shape[-1]))
         nonlinear = np.zeros((len(theta), more.shape[-1]))
-        place = np.argwhere(self.free)
+        indices = np.argwhere(self.free)
         together = np.zeros((len(theta), free, free))
         record = np.zeros((len(theta), 3)) if plausible else None
         direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
         response = response_matrix(theta, self.names)
         for unit in range(len(theta)):
-            noises = [SolvedNorms(every[unit], left[unit], one.weight, one.whiten[unit], 1.0) for one in plausible]
+            noises = [
+                SolvedNorms(every[unit], left[unit], noise.weight, noise.whiten[unit], 1.0) for noise in plausible
+            ]
             noises = noises or [SolvedNorms(every[unit], left[unit], 1.0, self.whiten[unit])]
-            whole = np.sum([noise.weight * noise.covariance(int(dof[unit])) for noise in noises], axis=0)
-            together[unit] = whole[:free, :free]
+            joint = np.sum([noise.weight * noise.covariance(int(dof[unit])) for noise in noises], axis=0)
+            together[unit] = joint[:free, :free]
             if record is not None:
                 share = used[unit] * (1.0 if weights is None else np.nan_to_num(weights[unit]))
                 share = share if share.sum() > 0.0 else used[unit].astype(np.float64)
-                own = [self._bias_place(axis) for axis in range(3)]
+                columns = [self._bias_column(axis) for axis in range(3)]
                 gain = SolvedNorms(every[unit], left[unit], 1.0, self.whiten[unit]).gain
                 square = [
-                    one.weight
-                    * one.of_record(own, direction[unit], other.slow[unit], share, response[unit], int(dof[unit]), gain)
-                    for one, other in zip(noises, plausible, strict=True)
+                    solved.weight
+                    * solved.of_record(
+                        columns, direction[unit], noise.slow[unit], share, response[unit], int(dof[unit]), gain
+                    )
+                    for solved, noise in zip(noises, plausible, strict=True)
                 ]
                 record[unit] = np.sqrt(np.sum(square, axis=0))
             for axis in range(3):
-                mine = np.flatnonzero(place[:, 0] == axis)
-                covariance[unit, axis][np.ix_(place[mine, 1], place[mine, 1])] = whole[np.ix_(mine, mine)]
-            nonlinear[unit] = np.sqrt(np.maximum(np.diagonal(whole)[free:], 0.0))
+                of_axis = np.flatnonzero(indices[:, 0] == axis)
+                covariance[unit, axis][np.ix_(indices[of_axis, 1], indices[of_axis, 1])] = joint[
+                    np.ix_(of_axis, of_axis)
+                ]
+            nonlinear[unit] = np.sqrt(np.maximum(np.diagonal(joint)[free:], 0.0))
         errors: dict[str, dict[str, float]] = {}
         for k, (effect, name) in enumerate(self.parameters()):
             errors.setdefault(effect, {})[name] = float(nonlinear[:, k].max())
@@ -260,8 +266,8 @@ class _Work:
         )
         return NormFit(fit, force, left, rows, self.free, together, record, dof.astype(np.int64), errors)
 
-    def _bias_place(self, axis: int) -> int:
-        """Place of the bias of an axis among the free coefficients."""
+    def _bias_column(self, axis: int) -> int:
+        """Index of the bias of an axis among the free coefficients."""
         column = [effect for effect, _ in self.names[axis]].index("bias")
         return int(np.flatnonzero((np.argwhere(self.free) == (axis, column)).all(axis=1))[0])
 

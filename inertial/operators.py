@@ -38,20 +38,20 @@ def recursion(start: ArrayLike, keep: Array, drive: Array) -> Array:
     rows = out.reshape(-1, out.shape[-1])
     if len(rows) > _FEW:
         # times first: a row is contiguous
-        kept, driven = (
+        keeps, driven = (
             np.ascontiguousarray(np.broadcast_to(a, drive.shape).reshape(len(rows), -1).T) for a in (keep, drive)
         )
         line = np.empty(rows.shape[::-1])
         line[0] = rows[:, 0]
-        for before, after, k, d in zip(line[:-1], line[1:], kept, driven, strict=True):
+        for before, after, k, d in zip(line[:-1], line[1:], keeps, driven, strict=True):
             np.multiply(before, k, out=after)
             np.add(after, d, out=after)
         rows[:] = line.T
         return out
     each = zip(*(np.broadcast_to(a, drive.shape).reshape(len(rows), -1).tolist() for a in (keep, drive)), strict=True)
-    for row, (kept, driven) in zip(rows, each, strict=True):
+    for row, (keeps, driven) in zip(rows, each, strict=True):
         line = [row[0].item()]
-        for k, d in zip(kept, driven, strict=True):
+        for k, d in zip(keeps, driven, strict=True):
             line.append(k * line[-1] + d)
         row[:] = line
     return out
@@ -112,15 +112,15 @@ class _Clamps:
         self._count, self._rows = step.shape
         size = max(int(np.sqrt(self._count)), 1)
         stretches = -(-self._count // size)
-        whole = np.zeros((stretches * size, self._rows))
-        whole[: self._count] = step
+        padded = np.zeros((stretches * size, self._rows))
+        padded[: self._count] = step
         # (size, stretches, rows)
-        own = np.ascontiguousarray(np.swapaxes(whole.reshape(stretches, size, self._rows), 0, 1))
-        self._shift = np.cumsum(own, axis=0)
+        steps = np.ascontiguousarray(np.swapaxes(padded.reshape(stretches, size, self._rows), 0, 1))
+        self._shift = np.cumsum(steps, axis=0)
         self._ends = np.empty((size, 2, stretches, self._rows))
         ends = np.empty((2, stretches, self._rows))
         ends[0], ends[1] = -1.0, 1.0
-        for change, clamped in zip(own, self._ends, strict=True):
+        for change, clamped in zip(steps, self._ends, strict=True):
             np.add(ends, change, out=clamped)
             np.maximum(clamped, -1.0, out=clamped)
             np.minimum(clamped, 1.0, out=clamped)

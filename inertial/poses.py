@@ -38,7 +38,7 @@ def orthogonal24() -> Array:
     """Angles (24, 2) in degrees of all 24 orientations of a cube: every face up, four times.
 
     Turns about the vertical change nothing in the force: on a two-axis table the lateral faces come twice, approached
-    anew, in place of the turns it cannot make.
+    anew, instead of the turns it cannot make.
     """
     turns = (0.0, 90.0, 180.0, 270.0)
     return np.array([(outer, inner) for outer in (0.0, 90.0, -90.0, 180.0, 90.0, -90.0) for inner in turns])

@@ -62,7 +62,7 @@ class Quantity:
     lowest, highest : where values of the column can lie; anything else in a file is a slip
     usual, spread : a value that a plan may take for granted, and how far it wanders about it on a station
     varied : how a plan varies it that leaves it to the station; None where its steps set it
-    reading : place among the columns that every station reads beside its records; 0 where not every station does
+    reading : position among the columns that every station reads beside its records; 0 where not every station does
     """
 
     column: str
@@ -232,7 +232,9 @@ def attribute_drivers() -> dict[str, str]:
     for row in RECORDED:
         if row.driver and row.attribute:
             attributes[row.column] = row.attribute
-        attributes |= {one.name: one.attribute for one in DERIVED if one.driver and one.column == row.column}
+        attributes |= {
+            derived.name: derived.attribute for derived in DERIVED if derived.driver and derived.column == row.column
+        }
     return attributes
 
 
@@ -259,7 +261,11 @@ def formula_names() -> dict[str, tuple[str, float, str]]:
         if row.formula:
             names[row.formula] = (row.attribute, row.formula_factor, row.meaning)
             names[row.column] = (row.attribute, 1.0, row.column_meaning)
-        names |= {one.formula: (one.attribute, 1.0, one.meaning) for one in DERIVED if one.column == row.column}
+        names |= {
+            derived.formula: (derived.attribute, 1.0, derived.meaning)
+            for derived in DERIVED
+            if derived.column == row.column
+        }
     return names
 
 

@@ -204,13 +204,13 @@ def _wings(x: Array, step: float) -> tuple[Index, Index, int]:
     blocks = away[: away.size // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
     spread = np.maximum(1.4826 * np.median(np.abs(blocks), axis=1), step / np.sqrt(12.0))
     calm = np.flatnonzero(spread <= _CALM * np.quantile(spread, 0.25))
-    own = spread[calm, None]
+    calm_spread = spread[calm, None]
     size = np.abs(blocks[calm])
     hits, offsets = np.zeros(size.shape, dtype=bool), np.zeros(size.shape, dtype=np.int64)
     for power in (2**k for k in _POWERS):
         centre = power * step
-        width = np.minimum(4.5 * own + step, _WIDEST * centre)
-        usable = centre > _WING * own
+        width = np.minimum(4.5 * calm_spread + step, _WIDEST * centre)
+        usable = centre > _WING * calm_spread
         at = [usable & (np.abs(size - part * centre) < width) for part in (1.0, *_BESIDE)]
         count, *beside = (int(np.count_nonzero(band)) for band in at)
         spread_out = int(np.count_nonzero(at[0].any(axis=1)))

@@ -247,12 +247,12 @@ def _at_dwells(grid: Array, values: Array, time: Array) -> Array:
     if len(grid) < 2 or not np.array_equal(flat_time, np.broadcast_to(flat_time[:1], flat_time.shape)):
         picked = np.array([np.interp(t, grid, v) for t, v in zip(flat_time, flat_values, strict=True)])
     else:
-        # units read at the same times share the places on the grid; the numbers are those of np.interp
+        # units read at the same times share the intervals of the grid; the numbers are those of np.interp
         at = np.clip(flat_time[0], grid[0], grid[-1])
-        place = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
-        below = flat_values[:, place]
-        step = grid[place + 1] - grid[place]
-        slope = (flat_values[:, place + 1] - below) / np.where(step > 0.0, step, 1.0)
-        picked = slope * (at - grid[place]) + below
+        lower = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
+        below = flat_values[:, lower]
+        step = grid[lower + 1] - grid[lower]
+        slope = (flat_values[:, lower + 1] - below) / np.where(step > 0.0, step, 1.0)
+        picked = slope * (at - grid[lower]) + below
         picked = np.where(at == grid[-1], flat_values[:, -1:], picked)
     return picked.reshape(*values.shape[:-1], time.shape[-1])

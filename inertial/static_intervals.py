@@ -86,8 +86,8 @@ def find(
     # the ends of the record are no hand's doing: nothing is trimmed there
     start = np.where(start > 0, start + trim, start)
     stop = np.where(stop < data.shape[0], stop - trim, stop)
-    kept = stop - start >= shortest
-    return StaticIntervals(start[kept], stop[kept], quiet, limit)
+    lasting = stop - start >= shortest
+    return StaticIntervals(start[lasting], stop[lasting], quiet, limit)
 
 
 def quiet_sd(x: Array, rate_hz: float, window_s: float) -> float:

@@ -46,12 +46,12 @@ def _worst_look(field: Candidates, drivers: list[Driver], model: Model) -> tuple
     for candidate in _everything(field, drivers):
         gain = space.gain(candidate)
         looks += gain.drop.size
-        for place, (drop, rank) in enumerate(zip(gain.drop.tolist(), gain.rank.tolist(), strict=True)):
+        for point, (drop, rank) in enumerate(zip(gain.drop.tolist(), gain.rank.tolist(), strict=True)):
             log_p = log_p_value(space, drop, rank)
             together = of_poses if candidate.shared else common
             if log_p < worst and together > 1.0:
                 log_p = log_p_value(
-                    space, drop * _own_part(space, candidate, place, together, model.problem.per_unit), rank
+                    space, drop * _own_part(space, candidate, point, together, model.problem.per_unit), rank
                 )
             worst = min(worst, log_p)
     return worst, looks
@@ -75,17 +75,17 @@ def _against_draws(draws: NoiseDraws, looks: Callable[[], Iterable[Candidate]], 
     return float(np.log((1.0 + beyond) / (1.0 + drawn)))
 
 
-def _own_part(space: Space, candidate: Candidate, place: int, common: float, axes: int) -> float:
+def _own_part(space: Space, candidate: Candidate, point: int, common: float, axes: int) -> float:
     """Part of the reduction by a test that remains if the noise common to all units is taken into account."""
     if candidate.shared:
         return 1.0 / common
     units = space.targets.shape[0] // axes
-    columns = space.project(space.whiten(candidate.of_blocks[:, :, place, :]))
+    columns = space.project(space.whiten(candidate.of_blocks[:, :, point, :]))
     inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=1e-4, hermitian=True)
     fitted = columns @ (inverse @ (np.swapaxes(columns, -1, -2) @ space.residual[..., None]))
     fitted = fitted[..., 0].reshape(units, axes, -1)
-    whole = max(float(np.sum(fitted**2)), 1e-300)
-    return 1.0 - float(units * np.sum(fitted.mean(axis=0) ** 2) / whole) * (1.0 - 1.0 / common)
+    total = max(float(np.sum(fitted**2)), 1e-300)
+    return 1.0 - float(units * np.sum(fitted.mean(axis=0) ** 2) / total) * (1.0 - 1.0 / common)
 
 
 def _everything(field: Candidates, drivers: list[Driver]) -> Iterator[Candidate]:

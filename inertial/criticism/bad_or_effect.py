@@ -21,7 +21,7 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
     """The bad dwells of a lot, without those that an effect explains at a lower price than they have together.
 
     The first dwells of a sensor that warms up deviate most: left out, they take the warm-up with them. An effect that explains
-    one of them alone has to be seen in the other dwells too: otherwise it says the same as the bad dwell, in more words.
+    a single one has to be seen in the other dwells, too: otherwise it only restates that the dwell is bad.
 
     Parameters
     ----------
@@ -35,22 +35,22 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
     best = next(iter(contest(field, base)), None)
     if best is None or not convincing(field, base, best):
         return found
-    kept = bad_dwells(base.with_term(best.term))
-    places = {d.place for d in kept}
-    explained = [d for d in found if d.place not in places]
+    beside_effect = bad_dwells(base.with_term(best.term))
+    indices = {d.index for d in beside_effect}
+    explained = [d for d in found if d.index not in indices]
     if not explained or -best.cost <= sum(_score(base, d) for d in explained):
         return found
-    return kept if len(explained) > 1 or _seen_without(base, rivals, best.term, explained) else found
+    return beside_effect if len(explained) > 1 or _seen_without(base, rivals, best.term, explained) else found
 
 
 def _seen_without(base: Model, effects: list[AnyEffect], term: Term, bad: list[BadDwell]) -> bool:
-    """Whether a term explains more than its price with the bad dwells left out, by what a named effect has to: one look only."""
-    rest = model_without(base, [d.place for d in bad])
+    """Whether a term explains more than its price with the bad dwells left out, as a named effect has to in a single look."""
+    rest = model_without(base, [d.index for d in bad])
     return -judge(Candidates(rest.problem, effects), rest, term).cost > float(np.log(max(rest.problem.count, 1)))
 
 
 def _score(base: Model, bad: BadDwell) -> float:
-    """What a bad dwell explains, less the price of its deviation and of its place among all dwells."""
+    """What a bad dwell explains, less the price of its deviation and of the choice among all dwells."""
     units, n = base.problem.lot.state.time.shape
     dof = max(base.space.dof, 1)
     drop = dof * float(np.log1p(bad.deviations**2 / dof))

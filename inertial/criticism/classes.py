@@ -80,19 +80,19 @@ class EffectClass:
 
 
 def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
-    """The class of one term of a model, with all other terms kept; every serious rival with its own noise."""
+    """The class of a term beside all other terms of a model; every serious rival with its own noise."""
     rest = model.without_term(term)
     leave = {t.effect.id for t in rest.terms if not isinstance(t.effect, Handling)}
     looked = scanned(field, [rest.at(model.noise)], leave)[0]
-    own = judge(field, rest, term)
-    least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR * _stretch(term, looked, own)
+    of_term = judge(field, rest, term)
+    least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR * _stretch(term, looked, of_term)
     near = [t for t, score in looked[:_MOST] if score > least and t.effect.id != term.effect.id]
     near = [t for t in near if term.effect.id not in t.effect.after]
     judged = [judge_refined(field, rest, t, model.noise) for t in near]
-    judged = ranked([own, *judged])
+    judged = ranked([of_term, *judged])
     if isinstance(term.effect, Handling):
         # an effect that explains far more than an error of handling is beside it, and no rival of it
-        held = next(rival for rival in judged if rival.term is own.term)  # ranked: at the noise of the best of them
+        held = next(rival for rival in judged if rival.term is of_term.term)  # ranked: at the noise of the best of them
         judged = [rival for rival in judged if rival is held or rival.cost > held.cost - CLASS_WIDTH]
     jumps = jumps_in_place_of(field, rest, judged[0])
     if jumps is not None:
@@ -110,28 +110,28 @@ def _alike(model: Model, term: Term) -> bool:
     units = model.problem.lot.state.time.shape[0]
     if units < _FEWEST or model.problem.lot.radial or term.shared:
         return False
-    space, own = model.at(model.with_term(term).noise), term.candidate(model.problem)
+    space, candidate = model.at(model.with_term(term).noise), term.candidate(model.problem)
     by_axis = np.eye(model.problem.per_unit)[np.arange(space.q.shape[0]) % model.problem.per_unit]
-    columns = np.einsum("bngp,ba->bngap", own.of_blocks, by_axis)
+    columns = np.einsum("bngp,ba->bngap", candidate.of_blocks, by_axis)
     common = space.gain(Candidate(columns.reshape(*columns.shape[:3], -1), shared=True))
-    each = space.gain(own)
+    each = space.gain(candidate)
     scores = [float(g.drop[0]) - price(float(g.drop[0]), float(g.rank[0])) for g in (common, each)]
     return scores[0] > scores[1] - CLASS_WIDTH
 
 
 def _with_jumps(judged: list[Rival], jumps: Jumps) -> list[Rival]:
-    """Rivals with the jumps of single axes that take the place of the best of them, at their score together."""
+    """Rivals with the jumps of single axes instead of the best rival, at the score that the jumps have together."""
     best, first = judged[0], jumps.terms[0]
     same = next((r for r in judged if r.term.effect.id == first.effect.id), replace(best, term=first, ratio=None))
     others = [r for r in judged if r is not same]
     return sorted([*others, replace(same, cost=min(same.cost, best.cost - jumps.ahead))], key=lambda r: r.cost)
 
 
-def _stretch(term: Term, looked: Sequence[tuple[Term, float]], own: Rival) -> float:
+def _stretch(term: Term, looked: Sequence[tuple[Term, float]], of_term: Rival) -> float:
     """Factor by which scores at the noise of the best differ more than those of rivals each at its own noise; one at least.
 
     What wander could take up of a slow effect counts in full at a noise without it: with four soaks in one direction a cubic of
     the temperature has a score of a thousand there, and of forty at the noise that is estimated again.
     """
     at_this_noise = next((score for other, score in looked if other.effect.id == term.effect.id), 0.0)
-    return max(at_this_noise / max(-own.cost, 1.0), 1.0)
+    return max(at_this_noise / max(-of_term.cost, 1.0), 1.0)

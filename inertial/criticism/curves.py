@@ -54,7 +54,7 @@ def fit_curves(model: Model, drivers: Sequence[Driver], noises: Sequence[Noise] 
     for noise in noises if len(alone) > 1 else ():
         for k in alone:
             fit = _with_curve(model, drivers[k], noise, held=True)
-            fits[k] = min(fit, fits.get(k, fit), key=lambda one: one.cost)
+            fits[k] = min(fit, fits.get(k, fit), key=lambda curve: curve.cost)
     best = min((fit.cost for fit in fits.values()), default=0.0)
     within = best + max(_BEHIND, _SHARE_BEHIND * (cost_of_model(model) - best))
     for k in alone:
@@ -64,9 +64,11 @@ def fit_curves(model: Model, drivers: Sequence[Driver], noises: Sequence[Noise] 
 
 
 def _same(driver: Driver, other: Driver) -> bool:
-    one, two = driver.candidate, other.candidate
-    alike = driver.ways == other.ways and one.shared == two.shared and one.of_blocks.shape == two.of_blocks.shape
-    return alike and bool(np.array_equal(one.of_blocks, two.of_blocks))
+    first, second = driver.candidate, other.candidate
+    alike = (
+        driver.ways == other.ways and first.shared == second.shared and first.of_blocks.shape == second.of_blocks.shape
+    )
+    return alike and bool(np.array_equal(first.of_blocks, second.of_blocks))
 
 
 def _fitted(model: Model, driver: Driver) -> CurveFit:
@@ -93,24 +95,24 @@ def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
     flat = candidate.of_blocks[:, :, 0, :]
     blocks, n = flat.shape[:2]
     white = space.whiten(flat)
-    whole, white, free = (a.reshape(blocks, n, ways, -1) for a in (flat, white, space.project(white)))
+    columns, white, free = (a.reshape(blocks, n, ways, -1) for a in (flat, white, space.project(white)))
     even = _evened(np.einsum("bnwp,bnwr->pr", free, free), np.sqrt(np.einsum("bnwp,bnwp->p", white, white)))
-    whole = whole @ even
+    columns = columns @ even
     free = (free @ even).reshape(blocks, n, -1)
     gram = np.swapaxes(free, -1, -2) @ free
     right = np.einsum("bnq,bn->bq", free, space.residual)
-    own = np.linalg.solve(gram + 1e-6 * np.eye(gram.shape[-1]), right[..., None])[..., 0]
+    curves = np.linalg.solve(gram + 1e-6 * np.eye(gram.shape[-1]), right[..., None])[..., 0]
     count = even.shape[-1]
     gram, right = gram.reshape(blocks, ways, count, ways, count), right.reshape(blocks, ways, count)
-    # the leading direction of the own curves of every block and way
-    shape = np.linalg.svd(own.reshape(-1, count), full_matrices=False)[2][0].astype(np.float64)
+    # the leading direction of the curves that each block and way has by itself
+    shape = np.linalg.svd(curves.reshape(-1, count), full_matrices=False)[2][0].astype(np.float64)
     for _ in range(_TURNS):
         inner = np.einsum("p,bwpvr,r->bwv", shape, gram, shape) + 1e-12 * np.eye(ways)
         size = np.linalg.solve(inner, (right @ shape)[..., None])[..., 0]
         together = np.einsum("bw,bwpvr,bv->pr", size, gram, size) + 1e-9 * np.eye(count)
         shape = np.linalg.solve(together, np.einsum("bw,bwp->p", size, right))
         shape /= max(float(np.linalg.norm(shape)), 1e-300)
-    return whole @ shape, blocks * ways + count - 1
+    return columns @ shape, blocks * ways + count - 1
 
 
 def _evened(gram: Array, size: Array) -> Array:

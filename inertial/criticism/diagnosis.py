@@ -9,7 +9,7 @@ from numpy.random import Generator
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.drivers import Driver, Misfit, looks_of, places
+from inertial.criticism.drivers import Driver, Misfit, looks_of, misfits_of_drivers
 from inertial.criticism.evidence import Evidence, evidence
 from inertial.criticism.examination import Named, worst
 from inertial.criticism.field import Candidates
@@ -83,7 +83,9 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     where = (
         ()
         if silent
-        else places(problem, drivers, base.at(beside.noise), beside.space.variance, _beyond_pose(base, drivers, beside))
+        else misfits_of_drivers(
+            problem, drivers, base.at(beside.noise), beside.space.variance, _beyond_pose(base, drivers, beside)
+        )
     )
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
     every = [*verdict.handled, *named]
@@ -148,7 +150,7 @@ def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
 
 
 def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tuple[Named, ...]:
-    """Errors after each class is added to those before it; where it adds nothing so, beside all others.
+    """Errors after each class is added to the classes before it; where it adds nothing so, beside all others.
 
     A second effect as large as the first, of another shape, hides from the dwells left out what the first predicts.
     """

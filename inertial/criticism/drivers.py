@@ -42,7 +42,7 @@ class Driver:
     make : its columns
     values : (units, n) of the driver itself, of a suspect (blocks, n), 0 … 1 over the run; None if it is not a single quantity
     part : what of the output follows it
-    ways : ways in which each block feels the dependence, with a size for each: the columns are those of the first way, then
+    ways : ways in which each block feels the dependence, with a size for each: the columns of the first way come before
         those of the second
     period : of a swing with the time, s; None of another curve
     """
@@ -117,13 +117,13 @@ def _transfer_curve(problem: Problem, values: Array) -> Candidate:
 
 
 def _of_axes(problem: Problem, columns: Array) -> Candidate:
-    """Columns (blocks or 3, n, d), the same for all units where they are of three axes."""
+    """Columns (blocks or 3, n, d): of all blocks, or of the three axes where all units have equal ones."""
     rows = None if len(columns) == problem.blocks else np.arange(problem.blocks) % problem.per_unit
     return Candidate(columns[:, :, None, :], shared=False, rows=rows)
 
 
 def _typical(problem: Problem, values: Array) -> tuple[Array, Array]:
-    """Forces and a quantity of one unit for all, where the forces are the same: a look needs no more."""
+    """Forces and a quantity of one unit instead of all, where the forces are equal in all: a look needs no more."""
     along = forces_along(problem)
     same = bool(np.all(along == along[:1]))
     return (along[:1], values.mean(axis=0, keepdims=True)) if same else (along, values)
@@ -173,8 +173,8 @@ def curve(values: Array, knots: int) -> Array:
     distinct = np.unique(np.round(z, 6))
     if distinct.size <= 3:
         return np.stack([z**k for k in range(1, distinct.size)], axis=-1)
-    places = np.unique(np.quantile(distinct, np.linspace(0.0, 1.0, min(knots + 1, distinct.size))))
-    return np.stack([z, *natural_spline(z, places)], axis=-1)
+    at = np.unique(np.quantile(distinct, np.linspace(0.0, 1.0, min(knots + 1, distinct.size))))
+    return np.stack([z, *natural_spline(z, at)], axis=-1)
 
 
 def _pose_columns(state: State, most: int) -> Array:
@@ -194,7 +194,7 @@ def _pose_columns(state: State, most: int) -> Array:
 
 
 def _by_block(problem: Problem, columns: Array) -> Candidate:
-    """Columns (units, n, d), the same for every axis, as a candidate."""
+    """Columns (units, n, d), equal on every axis, as a candidate."""
     axes = problem.blocks // len(problem.lot.state.time)
     rows = np.arange(problem.blocks) // axes if len(columns) > 1 else np.zeros(problem.blocks, dtype=np.intp)
     return Candidate(columns[:, :, None, :], shared=False, rows=rows)
@@ -212,7 +212,9 @@ _OF_POSE = frozenset({"pose", "approach", "outer_deg", "inner_deg"})
 """Drivers that are the pose, or how it was reached."""
 
 
-def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float, beyond: Space) -> list[Misfit]:
+def misfits_of_drivers(
+    problem: Problem, drivers: list[Driver], space: Space, floor_variance: float, beyond: Space
+) -> list[Misfit]:
     """Drivers of the residuals of a space, most significant first.
 
     A temperature that drifts by hundredths of a kelvin, or the time, follows the sequence of the poses: a quantity is a driver by
@@ -232,7 +234,7 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
             misfits.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
-    # two clocks of a run explain the same: their order is not that of rounding errors
+    # two clocks of a run explain equally much: their order must not depend on rounding errors
     misfits.sort(key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
     best: dict[str, Misfit] = {}
     for misfit in misfits:

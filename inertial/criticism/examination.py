@@ -86,7 +86,7 @@ class ExaminedRun:
     _made: tuple[list[object], Model] | None = None
 
     def estimate_loudness(self) -> None:
-        """Estimate the noise of each soak again: an error that was corrected is none of it."""
+        """Estimate the noise of each soak again: an error that was corrected is not noise."""
         self.lot = replace(self.lot, loudness=None)
         if self.soak is None:
             self.soak = soaks(self.lot.state)  # a correction of temperatures changes none of the soaks
@@ -116,14 +116,14 @@ class ExaminedRun:
         return True
 
     def model(self) -> Model:
-        """The model that is judged, in the lot without its bad dwells; the same object while nothing changes."""
+        """The model that is judged, in the lot without its bad dwells; one object as long as nothing changes."""
         parts: list[object] = [self.lot, *self.removed, *self.beside]
         if self._made is None or list(map(id, self._made[0])) != list(map(id, parts)):
             self._made = parts, self._new_model()
         return self._made[1]
 
     def _new_model(self) -> Model:
-        lot = without(self.lot, [d.place for d in self.removed]) if self.removed else self.lot
+        lot = without(self.lot, [d.index for d in self.removed]) if self.removed else self.lot
         problem = Problem(lot)
         base = Model(problem, with_turn_on(lot.state, terms_of(catalogue.get_all(self.effects), problem)))
         refuse_without_freedom(base)
@@ -134,7 +134,7 @@ class ExaminedRun:
 def examined(
     lot: Lot, effects: Sequence[str], barred: frozenset[str] = frozenset()
 ) -> "tuple[ExaminedRun, EffectSearch]":
-    """A run without bad dwells and handling errors, those of some ids excepted, and the search for effects in it."""
+    """A run without bad dwells and handling errors (except those of some ids), and the search for effects in it."""
     run = ExaminedRun(lot, tuple(effects), barred=set(barred))
     run.estimate_loudness()
     run.removed = bad_beside_effects(run.model(), run.effects)
@@ -145,42 +145,42 @@ def examined(
         if of_all and not any_of_all(run.model()):
             break
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
-        whole = Problem(run.lot, slope=searched.base.problem.slope)
-        kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)), of_all=of_all)
-        same = {d.place for d in kept} == {d.place for d in run.removed}
+        problem = Problem(run.lot, slope=searched.base.problem.slope)
+        removed = bad_dwells(replaced(Model(problem, searched.model.terms, near=searched.model.noise)), of_all=of_all)
+        same = {d.index for d in removed} == {d.index for d in run.removed}
         if same and not _placed_again(run, searched.model) and not _dropped(run, searched):
             break
-        run.removed = kept
+        run.removed = removed
         searched = mended(run)
     return run, searched
 
 
 def _dropped(run: ExaminedRun, searched: "EffectSearch") -> bool:
-    """Whether a handling error explains nothing any more beside what was found after it; then it is taken out."""
-    for one in run.handled if len(run.handled) + len(searched.result.added) > 1 else ():
-        if one.term is None:
+    """Whether a handling error explains nothing any more beside what was found after it; it is then withdrawn."""
+    for named in run.handled if len(run.handled) + len(searched.result.added) > 1 else ():
+        if named.term is None:
             continue
-        rest = searched.model.without_term(one.term)
-        if convincing(searched.field, rest, judge(searched.field, rest, one.term)):
+        rest = searched.model.without_term(named.term)
+        if convincing(searched.field, rest, judge(searched.field, rest, named.term)):
             continue
-        run.handled = [other for other in run.handled if other is not one]
-        run.beside = [term for term in run.beside if term is not one.term]
+        run.handled = [other for other in run.handled if other is not named]
+        run.beside = [term for term in run.beside if term is not named.term]
         return True
     return False
 
 
 def _placed_again(run: ExaminedRun, model: Model) -> bool:
-    """Whether a change during the run is at another dwell now that the bad dwells beside it are known; then it is moved there."""
+    """Whether a change during the run fits better at another dwell now that the bad dwells are known; it is then moved there."""
     moved = False
-    for at, one in enumerate(run.handled):
-        best = None if one.term is None else better_placed(model, one.term)
-        if one.term is None or best is None or not isinstance(best.effect, Handling):
+    for at, named in enumerate(run.handled):
+        best = None if named.term is None else better_placed(model, named.term)
+        if named.term is None or best is None or not isinstance(best.effect, Handling):
             continue
-        place = best.place
-        size = model.without_term(one.term).with_term(best).shared_sizes(best)
-        evidence, dwells = best.effect.describe(run.lot, size, **place), best.effect.dwells(run.lot, **place)
-        run.beside = [best if t is one.term else t for t in run.beside]
-        run.handled[at] = replace(one, term=best, evidence=evidence, dwells=tuple(dwells))
+        location = best.location
+        size = model.without_term(named.term).with_term(best).shared_sizes(best)
+        evidence, dwells = best.effect.describe(run.lot, size, **location), best.effect.dwells(run.lot, **location)
+        run.beside = [best if t is named.term else t for t in run.beside]
+        run.handled[at] = replace(named, term=best, evidence=evidence, dwells=tuple(dwells))
         moved = True
     return moved
 
@@ -211,8 +211,8 @@ def mended(run: ExaminedRun) -> EffectSearch:
         if not searched.handling and part.field is not fields:
             part.base.problem.forget()
             part.base.forget()
-            whole = search(fields, base, part.imitates, start=searched.added)
-            searched, of = replace(whole, ladder=searched.ladder), fields
+            result = search(fields, base, part.imitates, start=searched.added)
+            searched, of = replace(result, ladder=searched.ladder), fields
         if part.field is not fields:
             base.forget()
         if not searched.handling or len(run.handled) >= _MENDED:
@@ -232,16 +232,16 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     alternative = term.effect
     if not isinstance(alternative, Handling):
         raise TypeError(term.effect.id)
-    place = alternative.placed(run.lot, **term.place)
-    term = Term(alternative, tuple(place.items()))
+    location = alternative.placed(run.lot, **term.location)
+    term = Term(alternative, tuple(location.items()))
     model = searched.model.with_term(term)
     group = class_of(fields, model, term)
     size = model.shared_sizes(term)
-    units = alternative.units(**place)
+    units = alternative.units(**location)
     evidence, dwells = _described(fields, searched.model, term, alternative, size)
     before, after = left_out(searched.model), left_out(model, term)
     errors = rms(fitted_residuals(model)), *worst(before, after)
-    lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)
+    lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **location)
     carried, lasting = carried_by(searched.model, term), term if lot is None else None
     run.handled.append(Named(group, *errors, units, dwells, evidence, carried, lasting))
     if lot is None:
@@ -273,17 +273,17 @@ def _misfit(model: Model, richer: Model) -> Misfit:
 def _described(
     fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
 ) -> tuple[str, tuple[int, ...]]:
-    """The description of a handling error, and its dwells: at each place that explains the run equally well."""
-    lot, place = fields.problem.lot, term.place
+    """The description of a handling error, and its dwells: at each location that explains the run equally well."""
+    lot, location = fields.problem.lot, term.location
     best = judge(fields, beside, term).cost
     texts: list[str] = []
-    dwells = list(alternative.dwells(lot, **place))
-    for other in alternative.instead(lot, **place):
+    dwells = list(alternative.dwells(lot, **location))
+    for other in alternative.instead(lot, **location):
         rival = judge(fields, beside, Term(alternative, tuple(other.items())))
         if rival.cost < best + CLASS_WIDTH:
             texts.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
             dwells += alternative.dwells(lot, **other)
-    evidence = alternative.describe(lot, size, **place)
+    evidence = alternative.describe(lot, size, **location)
     evidence += f"; these dwells cannot separate it from {' or '.join(texts)}" if texts else ""
     return evidence, tuple(sorted(dwells))
 

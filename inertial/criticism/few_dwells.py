@@ -45,5 +45,5 @@ def contradicted(base: Model) -> Contradicted | None:
     if not log_p < np.log(CERTAIN_BELOW):
         return None
     there = np.isfinite(lot.error)
-    rms, samples = (float(np.sqrt(np.mean(one[there] ** 2))) for one in (fit.residuals, lot.error))
+    rms, samples = (float(np.sqrt(np.mean(series[there] ** 2))) for series in (fit.residuals, lot.error))
     return Contradicted(rms, samples, log_p)

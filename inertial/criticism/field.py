@@ -1,4 +1,4 @@
-"""The candidates of a search: effects at the values of their nonlinear parameters, alternatives at their places."""
+"""The candidates of a search: effects at the values of their nonlinear parameters, handling errors at their locations."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class Rival:
         return Rival(term, ratio.deviance, ratio.rank, -ratio.score, ratio.log_p, ratio)
 
     def at(self, shared: float) -> "Rival":
-        """The same rival with another φ."""
+        """The rival judged at another φ."""
         return self if self.ratio is None else Rival.of(self.term, self.ratio.at(shared))
 
 
@@ -63,30 +63,30 @@ class Candidates:
         for effect in effects:
             try:
                 grid = grid_of(effect, problem.lot.state)
-                problem.one.columns(effect, grid[0])
+                problem.first_unit.columns(effect, grid[0])
             except MissingInput as reason:
                 self.lacking[effect.id] = reason.quantity
                 continue
             self.effects.append(effect)
             self.grids[effect.id] = grid
         for alternative in handling:
-            places = [] if problem.lot.radial else alternative.places(problem.lot)
-            if places and problem.lot.state.time.shape[0] >= alternative.fewest_units:
+            locations = [] if problem.lot.radial else alternative.locations(problem.lot)
+            if locations and problem.lot.state.time.shape[0] >= alternative.fewest_units:
                 self.handling.append(alternative)
-                self.grids[alternative.id] = places
-                self._looked[alternative.id] = alternative.looks(problem.lot, len(places))
+                self.grids[alternative.id] = locations
+                self._looked[alternative.id] = alternative.looks(problem.lot, len(locations))
 
     @property
     def looks(self) -> int:
-        """Number of tests made in one pass: every effect at every value, every alternative at every place."""
+        """Number of tests made in one pass: every effect at every value, every alternative at every location."""
         return sum(self._looked.get(name, len(grid)) for name, grid in self.grids.items())
 
     def of(self, name: str) -> AnyEffect | Handling:
         """The candidate of an id."""
         return next(e for e in (*self.effects, *self.handling) if e.id == name)
 
-    def places(self, name: str) -> int:
-        """Number of places in the price of an alternative; one for an effect."""
+    def looks_of(self, name: str) -> int:
+        """Number of looks in the price of an alternative; one for an effect."""
         return self._looked.get(name, 1)
 
     def gains(
@@ -113,11 +113,11 @@ class Candidates:
 
     def _gain(self, spaces: Sequence[Space], effect: AnyEffect | Handling, first: int | None) -> list[Gain]:
         if isinstance(effect, OfOneDwell) and not self.problem.lot.radial:
-            places = np.array([int(place["at"]) for place in self.grids[effect.id]])
-            return [space.gain_of_dwells(self._every_dwell(effect), places) for space in spaces]
+            dwells = np.array([int(location["at"]) for location in self.grids[effect.id]])
+            return [space.gain_of_dwells(self._every_dwell(effect), dwells) for space in spaces]
         pieces = self.problem.pieces(effect, self.grids[effect.id], first=first)
         parts = [[space.gain(piece) for space in spaces] for piece in pieces]
-        return [Gain.joined(own) for own in zip(*parts, strict=True)]
+        return [Gain.joined(of_space) for of_space in zip(*parts, strict=True)]
 
     def _every_dwell(self, effect: OfOneDwell) -> Array:
         """Columns (blocks, n, p) of an alternative of one dwell, for each dwell in turn."""

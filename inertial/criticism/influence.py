@@ -39,16 +39,16 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
         carried = before**2 - richer.at(model.noise).residual ** 2
     units = model.problem.lot.state.time.shape[0]
     each = carried.reshape(units, -1, model.problem.n).sum(axis=1)
-    whole = float(np.sum(np.maximum(each, 0.0)))
-    if whole <= 0.0:
+    total = float(np.sum(np.maximum(each, 0.0)))
+    if total <= 0.0:
         return ()
     if term is not None and of_station(term):
-        # what concerns all units is carried by a dwell in all of them: without it in one, the others say the same
-        return _whole_dwells(each / whole)
+        # what concerns all units is carried by a dwell in all of them: without it in one unit, the others still show it
+        return _whole_dwells(each / total)
     influences: list[Influence] = []
-    for place in np.argsort(each, axis=None)[::-1][:_MOST].tolist():
-        unit, dwell = divmod(place, model.problem.n)
-        share = float(each[unit, dwell]) / whole
+    for index in np.argsort(each, axis=None)[::-1][:_MOST].tolist():
+        unit, dwell = divmod(index, model.problem.n)
+        share = float(each[unit, dwell]) / total
         if share <= 0.0 or sum(f.share for f in influences) > _CARRY:
             break
         influences.append(Influence(unit, dwell, share))

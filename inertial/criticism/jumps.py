@@ -62,13 +62,13 @@ def jumps_in_place_of(field: Candidates, model: Model, rival: Rival) -> Jumps | 
     if 1.5 * float(drops[largest].sum()) < score - CLASS_WIDTH:
         return None
     single = _single_jumps(field, space, alternatives)
-    of_axes = sorted((_best(field, space, int(b), single) for b in largest), key=lambda one: -one.score)
+    of_axes = sorted((_best(field, space, int(b), single) for b in largest), key=lambda of_axis: -of_axis.score)
     together, terms = 0.0, list[Term]()
-    for one in of_axes:
-        gain = one.score - (JUMPS_RARE if terms else 0.0)
+    for found in of_axes:
+        gain = found.score - (JUMPS_RARE if terms else 0.0)
         if gain > 0.0:
             together += gain
-            terms += one.terms
+            terms += found.terms
     ahead = float(together - score)
     return Jumps(tuple(terms), ahead) if terms and ahead > -CLASS_WIDTH else None
 
@@ -83,8 +83,8 @@ def _drops(space: Space, candidate: Candidate) -> Array:
     along = np.einsum("bnp,bn->bp", columns, space.residual)
     drops = np.einsum("bp,bpq,bq->b", along, inverse, along)
     # with their coefficients estimated again the effect explains more
-    whole, total = float(space.gain(candidate).drop[0]), max(float(drops.sum()), 1e-300)
-    return drops * max(whole / total, 1.0)
+    together, total = float(space.gain(candidate).drop[0]), max(float(drops.sum()), 1e-300)
+    return drops * max(together / total, 1.0)
 
 
 def _score(drops: Array, rival: Rival, per_unit: int) -> float:
@@ -100,7 +100,7 @@ def _score(drops: Array, rival: Rival, per_unit: int) -> float:
 
 
 def _evenness(drops: Array) -> float:
-    """Twice the logarithm of the probability that so few of several reductions have so much of them; zero where that is usual.
+    """Twice the log probability that the largest reductions (k,) exceed the others by as much; zero where that is usual.
 
     Coefficients from one normal distribution have reductions of chi-square of one degree of freedom each: those of the m largest
     and of the others have an F distribution, one for each of the possible choices. Noise alone gives one to each.
@@ -117,17 +117,17 @@ def _evenness(drops: Array) -> float:
 
 
 def _single_jumps(field: Candidates, space: Space, alternatives: Sequence[Handling]) -> dict[int, _OfAxis]:
-    """The best place of the best alternative in each block."""
+    """The best alternative of each block, at its best location."""
     best: dict[int, _OfAxis] = {}
     for alternative in alternatives:
         gain = field.gain_of(space, alternative)
-        paid = 2.0 * float(np.log(field.places(alternative.id)))
-        places = zip(field.grids[alternative.id], gain.drop.tolist(), gain.rank.tolist(), strict=True)
-        for place, drop, rank in places:
-            block = int(field.problem.per_unit * place["unit"] + place["axis"])
+        paid = 2.0 * float(np.log(field.looks_of(alternative.id)))
+        tried = zip(field.grids[alternative.id], gain.drop.tolist(), gain.rank.tolist(), strict=True)
+        for location, drop, rank in tried:
+            block = int(field.problem.per_unit * location["unit"] + location["axis"])
             score = drop - price(drop, rank) - paid
             if block not in best or score > best[block].score:
-                best[block] = _OfAxis(float(score), (Term(alternative, tuple(place.items())),))
+                best[block] = _OfAxis(float(score), (Term(alternative, tuple(location.items())),))
     return best
 
 
@@ -143,15 +143,17 @@ def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis
             here = (("unit", float(unit)), ("axis", float(axis)))
             terms = tuple(Term(jump, (*here, ("dwell", float(k)))) for k in dwells)
             tried.append(_OfAxis(drop - price(drop, len(dwells)) - 2.0 * chosen, terms))
-    return max(tried, key=lambda one: one.score)
+    return max(tried, key=lambda of_axis: of_axis.score)
 
 
 def _several(space: Space, block: int) -> Iterator[tuple[float, list[int]]]:
     """Reductions of the deviance by two jumps of a block and more, each with its dwells: two at a time, or one."""
     n = space.q.shape[1]
-    dwells, one = np.arange(1, n), np.array([block])
+    dwells, blocks = np.arange(1, n), np.array([block])
     steps = (np.arange(n)[:, None] >= dwells).astype(np.float64)[None]
-    white = space.project(space.covariance.whiten(steps, space.noise.shares, one) / space.noise.scale[block], one)[0]
+    white = space.project(
+        space.covariance.whiten(steps, space.noise.shares, blocks) / space.noise.scale[block], blocks
+    )[0]
     gram, along = white.T @ white, white.T @ space.residual[block]
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     gram, along = gram / size[:, None] / size, along / size
@@ -168,9 +170,9 @@ def _next_two(gram: Array, along: Array, chosen: list[int]) -> list[int]:
     if chosen:
         beside = np.linalg.lstsq(gram[np.ix_(chosen, chosen)], gram[chosen], rcond=1e-8)[0]
         gram, along = gram - gram[:, chosen] @ beside, along - beside.T @ along[chosen]
-    own = np.diag(gram)
-    determinant = own[:, None] * own - gram**2
-    squares = along[:, None] ** 2 * own + along**2 * own[:, None] - 2.0 * along[:, None] * along * gram
+    diagonal = np.diag(gram)
+    determinant = diagonal[:, None] * diagonal - gram**2
+    squares = along[:, None] ** 2 * diagonal + along**2 * diagonal[:, None] - 2.0 * along[:, None] * along * gram
     seen = determinant > 1e-3
     drop = np.where(seen, squares / np.where(seen, determinant, 1.0), 0.0)
     return [int(k) for k in np.unravel_index(int(np.argmax(drop)), drop.shape)]

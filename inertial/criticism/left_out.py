@@ -40,7 +40,7 @@ _UNDETERMINED = 1e-7
 """Smallest eigenvalue of P of the dwells left out, over the largest, at which the other dwells do not determine the model."""
 
 _SURELY = 1e-4
-"""Lower bound of the same ratio above which the eigenvalues of no block need be looked at."""
+"""Lower bound of that ratio above which the eigenvalues of no block need be looked at."""
 
 _ALONE = 0.9
 """Share of the sum of squares of a column in one fold, from which on the other dwells do not determine its coefficient."""
@@ -79,15 +79,15 @@ def left_out(model: Model, judged: Term | None = None, also: Sequence[Term] = ()
     missed: dict[Kind, Array] = {}
     density: dict[Kind, float] = {}
     for kind, fold in _folds(model.problem).items():
-        whole = np.full((model.problem.blocks, model.problem.n), np.nan)
+        residuals = np.full((model.problem.blocks, model.problem.n), np.nan)
         total, sound = 0.0, True
         for k in range(int(fold.max()) + 1):
             out = (fold == k) & ~_alone(begun, fold == k)
             predicted = parts.predicted(out)
             sound &= predicted is not None
             if predicted is not None:
-                whole[:, out], total = predicted[0], total + predicted[1]
-        missed[kind] = whole
+                residuals[:, out], total = predicted[0], total + predicted[1]
+        missed[kind] = residuals
         if sound:
             density[kind] = total
     return LeftOut(missed, density)
@@ -112,15 +112,15 @@ def _without_wander(model: Model, judged: Term | None) -> LeftOut:
     """Poses left out by weighted least squares: for records so long that wander is not modelled."""
     problem = model.problem
     fold = _by_pose(problem)
-    whole = np.full((problem.blocks, problem.n), np.nan)
-    kept = _kept(model, judged)
+    residuals = np.full((problem.blocks, problem.n), np.nan)
+    keeps = _fixed(model, judged)
     series = problem.y
-    if kept.any():
-        series = series - model.shared[..., kept] @ model.space.shared_sizes[kept]
+    if keeps.any():
+        series = series - model.shared[..., keeps] @ model.space.shared_sizes[keeps]
     fitting = Fitting(problem, [t for t in model.terms if not _keeps(t, judged)])
     for k in range(int(fold.max()) + 1):
-        whole[:, fold == k] = fitting.left(series[..., None], fold != k)[:, fold == k, 0]
-    return LeftOut({"poses": np.where(np.isfinite(problem.error), whole, np.nan)}, {"poses": 0.0})
+        residuals[:, fold == k] = fitting.left(series[..., None], fold != k)[:, fold == k, 0]
+    return LeftOut({"poses": np.where(np.isfinite(problem.error), residuals, np.nan)}, {"poses": 0.0})
 
 
 def _keeps(term: Term, judged: Term | None) -> bool:
@@ -128,12 +128,12 @@ def _keeps(term: Term, judged: Term | None) -> bool:
     return isinstance(term.effect, Handling) and (judged is None or term.key != judged.key)
 
 
-def _kept(model: Model, judged: Term | None) -> Flags:
+def _fixed(model: Model, judged: Term | None) -> Flags:
     """The shared columns (q,) of a model that keep their coefficients."""
-    kept = np.zeros(model.shared.shape[-1], dtype=bool)
-    for term, own in model.places(shared=True):
-        kept[own] = _keeps(term, judged)
-    return kept
+    keeps = np.zeros(model.shared.shape[-1], dtype=bool)
+    for term, columns in model.slices(shared=True):
+        keeps[columns] = _keeps(term, judged)
+    return keeps
 
 
 class _Parts:
@@ -150,7 +150,7 @@ class _Parts:
         inner = np.einsum("bnq,bnr->qr", white[..., 1:], white[..., 1:])
         if z.shape[-1]:
             py = py - pz @ np.linalg.lstsq(inner, np.einsum("bnq,bn->q", white[..., 1:], white[..., 0]), rcond=1e-10)[0]
-        again = ~_kept(model, judged)
+        again = ~_fixed(model, judged)
         pz, self.inner = pz[..., again], inner[np.ix_(again, again)]
         level = space.covariance.level * space.noise.scale
         along = space.backed(space.q) * level[:, None, None]
@@ -168,17 +168,19 @@ class _Parts:
         right = np.zeros(inner.shape[0])
         held: list[tuple[_Group, Places, _Fold]] = []
         for group in self.groups:
-            places = np.flatnonzero(out & group.there)
-            if not places.size:
+            dwells = np.flatnonzero(out & group.there)
+            if not dwells.size:
                 continue
-            own = group.left_out(places)
-            if own is None:
+            fold = group.left_out(dwells)
+            if fold is None:
                 return None
-            py, pz = group.py[:, places], group.pz[:, places]
-            density += 0.5 * own.log_det - 0.5 * own.off.size * np.log(2.0 * np.pi) - 0.5 * float(np.sum(py * own.off))
-            inner -= np.einsum("bkq,bkr->qr", pz, own.across)
-            right += np.einsum("bkq,bk->q", pz, own.off)
-            held.append((group, places, own))
+            py, pz = group.py[:, dwells], group.pz[:, dwells]
+            density += (
+                0.5 * fold.log_det - 0.5 * fold.off.size * np.log(2.0 * np.pi) - 0.5 * float(np.sum(py * fold.off))
+            )
+            inner -= np.einsum("bkq,bkr->qr", pz, fold.across)
+            right += np.einsum("bkq,bk->q", pz, fold.off)
+            held.append((group, dwells, fold))
         turn = np.zeros(right.shape)
         if right.size:
             values, vectors = np.linalg.eigh(inner)
@@ -186,14 +188,14 @@ class _Parts:
                 return None
             # errors of the shared coefficients, as the other dwells determine them, in the prediction
             half = vectors / np.sqrt(values)
-            if any(own.is_blind(np.mean(np.sum((own.across @ half) ** 2, axis=-1), axis=-1)) for *_, own in held):
+            if any(fold.is_blind(np.mean(np.sum((fold.across @ half) ** 2, axis=-1), axis=-1)) for *_, fold in held):
                 return None
             turn = np.linalg.solve(inner, right)
             density += 0.5 * float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(self.inner)[1])
             density -= 0.5 * float(right @ turn)
         where = np.cumsum(out) - 1
-        for group, places, own in held:
-            missed[np.ix_(group.members, where[places])] = own.off + own.across @ turn
+        for group, dwells, fold in held:
+            missed[np.ix_(group.members, where[dwells])] = fold.off + fold.across @ turn
         return missed, density
 
 
@@ -242,38 +244,38 @@ class _Group:
     @cached_property
     def typical(self) -> Array:
         """Variance of what the model leaves of each block, (b,): nothing that it predicts should be much worse."""
-        own = np.flatnonzero(self.there)
-        root = solve_triangular(self.whitener[np.ix_(own, own)], np.eye(own.size), lower=True)
+        measured = np.flatnonzero(self.there)
+        root = solve_triangular(self.whitener[np.ix_(measured, measured)], np.eye(measured.size), lower=True)
         # P⁺ = (I − UUᵀ)V(I − UUᵀ) with an orthonormal basis U of the columns
-        basis, rank = orthonormal(self.local[:, own])
+        basis, rank = orthonormal(self.local[:, measured])
         inside = np.einsum("bnp,bnp->b", root.T @ basis, root.T @ basis)
-        return self.level**2 * (np.sum(root**2) - inside) / np.maximum(own.size - rank, 1)
+        return self.level**2 * (np.sum(root**2) - inside) / np.maximum(measured.size - rank, 1)
 
-    def left_out(self, places: Places) -> _Fold | None:
-        """The dwells at some places; None if the others determine too little.
+    def left_out(self, dwells: Places) -> _Fold | None:
+        """The fold of some dwells (k,); None if the others determine too little.
 
         (S − AᵀA)⁻¹ = S⁻¹ + S⁻¹Aᵀ(I − AS⁻¹Aᵀ)⁻¹AS⁻¹: one inverse for all blocks, and a small one for each.
         """
-        whole = self.inverse[np.ix_(places, places)]
-        values, vectors = np.linalg.eigh(whole)
+        precision = self.inverse[np.ix_(dwells, dwells)]
+        values, vectors = np.linalg.eigh(precision)
         inverse = (vectors / values) @ vectors.T
-        rows = self.along[:, :, places]
+        rows = self.along[:, :, dwells]
         turned = rows @ inverse
         small = np.eye(rows.shape[1]) - turned @ np.swapaxes(rows, -1, -2)
         remains, directions = np.linalg.eigh(small)
         least = remains.min(initial=1.0)
         if least * values[0] <= _SURELY * values[-1]:
-            exact = np.linalg.eigvalsh(whole - np.swapaxes(rows, -1, -2) @ rows)
+            exact = np.linalg.eigvalsh(precision - np.swapaxes(rows, -1, -2) @ rows)
             if bool(np.any(exact[:, 0] <= _UNDETERMINED * exact[:, -1])):
                 return None
         half = np.swapaxes(directions, -1, -2) @ turned / np.sqrt(remains)[..., None]
-        expected = (np.trace(inverse) + np.einsum("brk,brk->b", half, half)) * self.level**2 / places.size
-        alone = np.mean(1.0 / np.diagonal(whole)) * self.level**2
-        right = np.concatenate([self.py[:, places, None], self.pz[:, places]], axis=-1)
+        expected = (np.trace(inverse) + np.einsum("brk,brk->b", half, half)) * self.level**2 / dwells.size
+        alone = np.mean(1.0 / np.diagonal(precision)) * self.level**2
+        right = np.concatenate([self.py[:, dwells, None], self.pz[:, dwells]], axis=-1)
         solved = inverse @ right + np.swapaxes(half, -1, -2) @ (half @ right)
         solved *= self.level[:, None, None] ** 2
         log_det = float(np.sum(np.log(remains)) + len(rows) * np.sum(np.log(values)))
-        log_det -= 2.0 * places.size * float(np.sum(np.log(self.level)))
+        log_det -= 2.0 * dwells.size * float(np.sum(np.log(self.level)))
         enough = decisions.FOLD_BLIND**2 * np.maximum(alone, self.typical)
         fold = _Fold(solved[..., 0], solved[..., 1:], log_det, expected, enough)
         return None if fold.is_blind() else fold

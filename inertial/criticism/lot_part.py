@@ -77,8 +77,8 @@ class LotPart:
         better = better_curve(base, [*held, *further], self.every_suspect)
         if better is None:
             return None
-        fit, kept = better
-        remaining = {t.key for t in kept}
+        fit, terms = better
+        remaining = {t.key for t in terms}
         imitations = frozenset(t.effect.id for t in held if t.key not in remaining)
         return (unexplained_by(base, fit, len(self.every_suspect)), imitations) if imitations else None
 
@@ -89,10 +89,10 @@ def part_of(field: Candidates, base: Model, *, wide: bool) -> LotPart:
     count = lot.state.time.shape[0]
     if count <= _MANY:
         return LotPart(field, base, wide)
-    own = {
+    of_one_unit = {
         int(np.mean(t.keywords["unit"])) for t in base.terms if isinstance(t.effect, Handling) and "unit" in t.keywords
     }
-    sound = [unit for unit in range(count) if unit not in own]
+    sound = [unit for unit in range(count) if unit not in of_one_unit]
     pick = np.array(sound)[np.linspace(0, len(sound) - 1, min(_ENOUGH, len(sound))).round().astype(int)]
     slope = field.problem.slope
     problem = Problem(lot.units(pick.tolist()), slope=None if slope is None else slope[pick])

@@ -16,7 +16,7 @@ from inertial.estimation.bases import SEEN, eigen, inverse_roots
 from inertial.estimation.candidate import Candidate, times_rows
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, Shares
-from inertial.estimation.shares import place_of, shares_at
+from inertial.estimation.shares import nearest_point, shares_at
 from inertial.estimation.space import Space
 from inertial.probability import log_f_tail
 
@@ -24,7 +24,7 @@ _PIECE = 150_000
 """Largest number of values worked on at a time."""
 
 _KEPT = 3_200_000
-"""Largest number of values of bases that are kept for further draws."""
+"""Largest number of values of bases that are stored for further draws."""
 
 _OFF = (-8, -4, 0, 4, 8)
 """Eighths of a decade about the fitted shares within which the noise of a draw is estimated."""
@@ -77,24 +77,26 @@ class NoiseDraws:
         order = np.argsort(chosen, kind="stable")
         for some in _some_blocks(rows):
             rows[some] = np.take(rows[some], order, axis=1)
-        places, first = np.unique(chosen[order], return_index=True)
+        points, first = np.unique(chosen[order], return_index=True)
         groups = [slice(a, b) for a, b in zip(first, [*first[1:], count], strict=True)]
-        total = np.concatenate([self._left(rows, k, own) for k, own in zip(places.tolist(), groups, strict=True)])
-        dof = {k: self._basis(k).dof for k in places.tolist()}
+        total = np.concatenate(
+            [self._left(rows, point, draws) for point, draws in zip(points.tolist(), groups, strict=True)]
+        )
+        dof = {point: self._basis(point).dof for point in points.tolist()}
         worst, spaces = np.zeros(count), dict[int, Space]()
-        for place, candidate in enumerate(looks):
+        for look, candidate in enumerate(looks):
             along = times_rows(rows, candidate)
-            for k, own in zip(places.tolist(), groups, strict=True):
-                if (place, k) not in self._directions:
-                    if k not in spaces:
-                        spaces[k] = self.model.at(Noise(self._shares(k), self.model.noise.scale))
-                    self._directions[place, k] = Directions.of(spaces[k], candidate)
-                found = self._directions[place, k]
-                for drop, rank in zip(found.drops(along[..., own]), found.ranks.tolist(), strict=True):
-                    after = dof[k] - rank
+            for point, draws in zip(points.tolist(), groups, strict=True):
+                if (look, point) not in self._directions:
+                    if point not in spaces:
+                        spaces[point] = self.model.at(Noise(self._shares(point), self.model.noise.scale))
+                    self._directions[look, point] = Directions.of(spaces[point], candidate)
+                found = self._directions[look, point]
+                for drop, rank in zip(found.drops(along[..., draws]), found.ranks.tolist(), strict=True):
+                    after = dof[point] - rank
                     if rank and after > 0:
-                        ratio = (drop / rank) / (np.maximum(total[own] - drop, 1e-300) / after)
-                        worst[own] = np.minimum(worst[own], log_f_tail(ratio, rank, after))
+                        ratio = (drop / rank) / (np.maximum(total[draws] - drop, 1e-300) / after)
+                        worst[draws] = np.minimum(worst[draws], log_f_tail(ratio, rank, after))
         drawn = np.empty(count)
         drawn[order] = worst
         return drawn.reshape(batches, -1)
@@ -119,26 +121,26 @@ class NoiseDraws:
             self._states.append(self.rng.bit_generator.state)
         return problem.covariance.coloured(self.model.noise, rows)
 
-    def _shares(self, place: int) -> Shares:
+    def _shares(self, point: int) -> Shares:
         flicker, walk = self.lattice
-        return shares_at((flicker[place // len(walk)], walk[place % len(walk)]), self.model.noise.shares.own)
+        return shares_at((flicker[point // len(walk)], walk[point % len(walk)]), self.model.noise.shares.by_block)
 
-    def _basis(self, place: int) -> _Basis:
-        """What the columns of the model span at the shares of a place of the lattice."""
-        if place not in self._bases:
-            shares = self._shares(place)
+    def _basis(self, point: int) -> _Basis:
+        """What the columns of the model span at the shares of a point of the lattice."""
+        if point not in self._bases:
+            shares = self._shares(point)
             space = self.model.at(Noise(shares, np.ones(self.model.problem.blocks)))
             determinants = space.logdet + space.information
             made = _Basis(shares, space.q, space.by_block, space.dof, determinants)
             while self._bases and (len(self._bases) + 1) * made.q.size > _KEPT:
                 del self._bases[next(iter(self._bases))]
-            self._bases[place] = made
-        return self._bases[place]
+            self._bases[point] = made
+        return self._bases[point]
 
     def _estimated(self, rows: Array) -> Places:
-        """The place of the lattice with the smallest restricted deviance of each draw, (draws,).
+        """The point of the lattice with the smallest restricted deviance of each draw, (draws,).
 
-        Descent from the shares that the draws were made with, by the places about the best of each draw.
+        Descent from the shares that the draws were made with, by the points about the best of each draw.
         """
         across, columns = (len(each) for each in self.lattice)
         deviances = np.full((across * columns, rows.shape[1]), np.inf)
@@ -146,16 +148,16 @@ class NoiseDraws:
         best = np.full(rows.shape[1], self.start)
         while True:
             wanted = np.zeros(done.shape, dtype=bool)
-            for draw, place in enumerate(best.tolist()):
-                row, column = divmod(place, columns)
+            for draw, point in enumerate(best.tolist()):
+                row, column = divmod(point, columns)
                 near = np.zeros((across, columns), dtype=bool)
                 near[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = True
                 wanted[:, draw] = near.ravel() & ~done[:, draw]
             if not wanted.any():
                 return best
-            for place in np.flatnonzero(wanted.any(axis=1)).tolist():
-                draws = np.flatnonzero(wanted[place])
-                deviances[place, draws] = self._deviances(self._basis(place), rows, draws)
+            for point in np.flatnonzero(wanted.any(axis=1)).tolist():
+                draws = np.flatnonzero(wanted[point])
+                deviances[point, draws] = self._deviances(self._basis(point), rows, draws)
             done |= wanted
             best = np.argmin(deviances, axis=0)
 
@@ -171,12 +173,12 @@ class NoiseDraws:
             log_squares += basis.by_block[some] @ np.log(np.maximum(squares, 1e-300))
         return basis.determinants + log_squares
 
-    def _left(self, rows: Array, place: int, draws: slice) -> Array:
+    def _left(self, rows: Array, point: int, draws: slice) -> Array:
         """Sums of squares (draws,) of what the model leaves of draws with equal shares, over their estimated variances.
 
-        In place of the draws are afterwards the rows that give their products with columns in g.
+        The draws are overwritten by the rows that give their products with columns in g.
         """
-        covariance, noise, basis = self.model.problem.covariance, self.model.noise, self._basis(place)
+        covariance, noise, basis = self.model.problem.covariance, self.model.noise, self._basis(point)
         scale = covariance.level * noise.scale
         squares = np.empty((len(rows), rows[0, draws].shape[0]))
         for some in _some_blocks(rows):
@@ -212,11 +214,11 @@ class Directions:
     def of(space: Space, candidate: Candidate) -> "Directions":
         """The directions of a candidate in a space."""
         found = space.products(candidate)
-        own, squares = found.left, found.squares
+        left, squares = found.left, found.squares
         if candidate.shared:
-            own, squares = own.sum(axis=0, keepdims=True), squares.sum(axis=0, keepdims=True)
+            left, squares = left.sum(axis=0, keepdims=True), squares.sum(axis=0, keepdims=True)
         size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
-        values, vectors = eigen(own / (size[..., :, None] * size[..., None, :]))
+        values, vectors = eigen(left / (size[..., :, None] * size[..., None, :]))
         vectors = vectors * inverse_roots(values, SEEN**2)[..., None, :]
         turn = np.swapaxes(vectors, -1, -2) / size[..., None, :]
         return Directions(turn, (values > SEEN**2).sum(axis=(0, 2)), candidate.shared)
@@ -238,13 +240,13 @@ def _some_blocks(rows: Array) -> list[slice]:
 
 
 def _lattice(shares: Shares) -> tuple[tuple[list[int | None], list[int | None]], int]:
-    """The lattice about fitted shares, none first, each share in rising order; and the place in it of the fitted ones."""
-    fitted = place_of(shares)
+    """The lattice about fitted shares, none first, each share in rising order; and the index in it of the fitted ones."""
+    fitted = nearest_point(shares)
     rows, columns = (_about(k) for k in fitted)
     return (rows, columns), rows.index(fitted[0]) * len(columns) + columns.index(fitted[1])
 
 
 def _about(k: int | None) -> list[int | None]:
-    """A share of the lattice, those about it, and none."""
+    """A share of the lattice, its neighbours, and none."""
     near = {LEAST_SHARE, LEAST_SHARE + 8} if k is None else {max(k + d, LEAST_SHARE) for d in _OFF}
     return [None, *sorted(near)]

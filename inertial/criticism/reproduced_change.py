@@ -52,7 +52,7 @@ class ReproducedChange:
 
     @property
     def confirmed(self) -> bool | None:
-        """Confirmed, not there, or (None) not decided."""
+        """Whether the fresh run confirms the effect (True) or refutes it (False); None where it does not decide."""
         if not np.isfinite(self.part) or not np.isfinite(self.error):
             return None
         if self.part > CONFIRMED * self.error:
@@ -68,10 +68,10 @@ def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> Reproduced
     lot : the fresh run, in the scale of the first
     before, after : the models without and with the effect, fitted to the first run
     """
-    whole = Model(Problem(lot), after.terms)
-    lot = without(lot, [d.place for d in bad_dwells(whole)])
+    model = Model(Problem(lot), after.terms)
+    lot = without(lot, [d.index for d in bad_dwells(model)])
     problem = Problem(lot)
-    noise = Model(problem, after.terms, near=whole.noise).noise
+    noise = Model(problem, after.terms, near=model.noise).noise
     zero = np.where(np.isfinite(problem.error), 1.0, 0.0)
     left = np.nan_to_num(residuals_of(problem, before))
     change = left - np.nan_to_num(residuals_of(problem, after))
@@ -81,16 +81,18 @@ def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> Reproduced
     )
     shared = space.gram[1:, 1:]
     # columns shared by all that are estimated again come first, the change last: its coefficient is λ
-    own = float(shared[-1, -1])
+    squares = float(shared[-1, -1])
     along = float(space.gram[-1, 0])
     if shared.shape[0] > 1:
         rest = np.linalg.pinv(shared[:-1, :-1], rcond=1e-10, hermitian=True)
         along -= float(shared[-1, :-1] @ rest @ space.gram[1:-1, 0])
-        own -= float(shared[-1, :-1] @ rest @ shared[:-1, -1])
-    if own <= 1e-9 * max(float(np.sum(space.whiten(change[..., None]) ** 2)), 1e-300):
+        squares -= float(shared[-1, :-1] @ rest @ shared[:-1, -1])
+    if squares <= 1e-9 * max(float(np.sum(space.whiten(change[..., None]) ** 2)), 1e-300):
         return ReproducedChange(float("nan"), float("nan"), *_falls(problem, base, left, change), again)
     wide = _together(Model(problem, after.terms, near=noise), space.targets[..., -1])
-    return ReproducedChange(along / own, float(np.sqrt(wide / own)), *_falls(problem, base, left, change), again)
+    return ReproducedChange(
+        along / squares, float(np.sqrt(wide / squares)), *_falls(problem, base, left, change), again
+    )
 
 
 def _base(problem: Problem, terms: tuple[Term, ...]) -> tuple[Model, str]:
@@ -148,8 +150,8 @@ def _own_out(problem: Problem, base: Model, series: Array) -> Array:
         return series
     u, s, _ = np.linalg.svd(local, full_matrices=False)
     u = u * (s > 1e-9 * s[:, :1])[:, None, :]
-    own = np.where(np.isfinite(problem.error), series, 0.0)
-    return own - (u @ (np.swapaxes(u, -1, -2) @ own[..., None]))[..., 0]
+    measured = np.where(np.isfinite(problem.error), series, 0.0)
+    return measured - (u @ (np.swapaxes(u, -1, -2) @ measured[..., None]))[..., 0]
 
 
 def _jackknife(parts: Array) -> float:

@@ -21,7 +21,7 @@ from inertial.estimation.term import Term
 from inertial.probability import log_chi2_tail
 
 _FINALISTS = 5  # finalists at each noise, for which the noise is estimated again
-_AGAIN = 3  # the same for the second examination of an effect
+_AGAIN = 3  # finalists of the second examination of an effect
 _MOST = 6  # largest number of effects of one search
 _AS_MUCH = 1.0  # score by which further columns of an effect must be better than its leading column
 _INEXACT = 0.01  # share of a wrong angle that the scale factors and misalignments of the devices leave of it
@@ -155,7 +155,7 @@ def is_remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
 
 
 def size_where_it_acts(model: Model, term: Term) -> float:
-    """The same over the dwells that the term changes: an error of one dwell is not diluted by the others."""
+    """RMS, g, of a term over the dwells that it changes: an error of one dwell is not diluted by the others."""
     size = size_of(model, term)
     if not isinstance(term.effect, Handling):
         return size
@@ -205,27 +205,27 @@ def _best_first(
     tried: dict[str, tuple[float, Term]] = {}
     for primary, gains in ((False, complete), (True, leading)):
         for name, gain in gains.items():
-            score, place = _best_of(field, space, name, gain)
+            score, point = _best_of(field, space, name, gain)
             # fewer columns that explain as much come first
             least = tried[name][0] - _AS_MUCH if name in tried else 0.0
             if score > max(least, 0.0):
                 effect = field.of(name)
-                values = tuple(field.grids[name][place].items())
+                values = tuple(field.grids[name][point].items())
                 tried[name] = (score, Term(effect, values, effect.primary if primary else None))
     return [(term, score) for score, term in sorted(tried.values(), key=lambda pair: -pair[0])]
 
 
 def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[float, int]:
-    """Best score of a candidate at a noise, and its place on the grid; nothing if noise alone explains it."""
+    """Best score of a candidate at a noise, and its index on the grid; zero if noise alone explains it."""
     falls = fall(space, gain)
-    place = int(np.argmax(falls))
-    if not gain.rank[place]:
-        return 0.0, place
-    several = len(field.grids[name]) > 1 and field.places(name) == 1
+    point = int(np.argmax(falls))
+    if not gain.rank[point]:
+        return 0.0, point
+    several = len(field.grids[name]) > 1 and field.looks_of(name) == 1
     nonlinear = len(field.grids[name][0]) if several else 0
-    ratio = weighed(float(falls[place]), int(gain.rank[place]), nonlinear, field.places(name))
+    ratio = weighed(float(falls[point]), int(gain.rank[point]), nonlinear, field.looks_of(name))
     likely = ratio.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
-    return (0.0 if likely else ratio.score), place
+    return (0.0 if likely else ratio.score), point
 
 
 def judge_refined(field: Candidates, model: Model, term: Term, noise: Noise | None = None) -> Rival:
@@ -288,11 +288,11 @@ def _only_tilted(model: Model, term: Term) -> bool:
 
 
 def _judged(field: Candidates, model: Model, term: Term) -> Rival:
-    return Rival.of(term, likelihood_ratio(model, term, field.places(term.effect.id)))
+    return Rival.of(term, likelihood_ratio(model, term, field.looks_of(term.effect.id)))
 
 
 def _begun(model: Model, term: Term) -> tuple[Term, ...]:
-    """A term, and where it remembers, the same without coefficients for the state of each series before the first dwell.
+    """A term, and, if it has a memory, that term without coefficients for the state of each series before the first dwell.
 
     It is then at rest, or where the effect has a parameter for that state, as this says. Devices are at rest when a run begins,
     as a rule. A coefficient for the state of every series would be paid for else, and an effect without memory that leaves as
@@ -307,22 +307,22 @@ def _begun(model: Model, term: Term) -> tuple[Term, ...]:
 
 
 def ranked(rivals: Sequence[Rival]) -> list[Rival]:
-    """Rivals, best first, at the φ of the one that is best at its own.
+    """Rivals, best first, at the φ of the rival that is best with each at its own φ.
 
     Two effects that are identical in the poses of a plan have equal residuals, but their φ, from medians, differ by a few per
     cent of the deviance: each at its own φ, one of the two would be alone in its class.
     """
-    own = sorted(rivals, key=lambda r: r.cost)
-    if not own or own[0].ratio is None:
-        return own
-    shared = own[0].ratio.shared
-    return sorted((r.at(shared) for r in own), key=lambda r: r.cost)
+    ordered = sorted(rivals, key=lambda r: r.cost)
+    if not ordered or ordered[0].ratio is None:
+        return ordered
+    shared = ordered[0].ratio.shared
+    return sorted((r.at(shared) for r in ordered), key=lambda r: r.cost)
 
 
 def _reexamine(
     field: Candidates, base: Model, model: Model, chosen: list[Term]
 ) -> tuple[Model, list[Term], Term | None]:
-    """Each chosen effect again beside the others: kept, replaced by a better one, or removed.
+    """Each chosen effect again beside the others: left as it is, replaced by a better one, or removed.
 
     The last of what is returned is a handling error that is beyond the class of the effect whose place it takes.
     """

@@ -32,11 +32,11 @@ from inertial.estimation.term import Term
 from inertial.quantities import is_clock
 
 _KNOTS = 9  # of a smooth curve over a driver
-_TIME_KNOTS = 12  # the same over time
+_TIME_KNOTS = 12  # of a curve over time
 _FEW_KNOTS = 6  # of a smooth dependence of the scale factors
 _WIDE_KNOTS = 6  # of a smooth curve of the misalignment
-_TURNED_KNOTS = 2  # of the same for the fixture's rotation, whose every column has three coefficients of the whole lot
-_FORCE_KNOTS = 7  # of the same over the force along an axis
+_TURNED_KNOTS = 2  # of a curve of the fixture's rotation, whose every column has three coefficients of the whole lot
+_FORCE_KNOTS = 7  # of a curve over the force along an axis
 _HARMONICS = 5  # of a table angle
 _CYCLES = np.arange(1.0, 14.1, 0.5)  # of a swing within the run
 _BETWEEN = (0.125, 0.05, 0.02)  # steps of the cycles between two of them
@@ -81,14 +81,14 @@ def suspects(problem: Problem) -> list[Driver]:
             if steps is not None:
                 suspected.append(Driver(name, _alike(problem, steps)))
             if not problem.lot.radial and knots > 2:
-                # the same dependence of the scale factors: what the driver changes is then felt along each axis
+                # a dependence of the scale factors: what the driver changes is then felt along each axis
                 suspected.append(Driver(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
     if not problem.lot.radial:
-        own = own_forces(problem).reshape(problem.blocks, problem.n)
-        suspected.append(Driver("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
+        force = own_forces(problem).reshape(problem.blocks, problem.n)
+        suspected.append(Driver("pose", _columns(curve(force, _KNOTS)), _unit_range(force)))
         suspected += _table(problem)
-    whole = max(float(np.ptp(state.time)), 1.0)
-    return [*suspected, *(_swing(problem, whole / cycles) for cycles in _CYCLES)]
+    duration = max(float(np.ptp(state.time)), 1.0)
+    return [*suspected, *(_swing(problem, duration / cycles) for cycles in _CYCLES)]
 
 
 def wide_suspects(problem: Problem) -> list[Driver]:
@@ -105,13 +105,13 @@ def wide_suspects(problem: Problem) -> list[Driver]:
     for name, values, _ in quantities(state):
         if not varies(values) or (name == "chamber_C" and alike(values, state.temperature)):
             continue
-        own = curve(values, _WIDE_KNOTS)  # (units or 1, n, d)
-        if own.shape[-1] < 2:  # a line, or levels that handling errors already are
+        driver_curve = curve(values, _WIDE_KNOTS)  # (units or 1, n, d)
+        if driver_curve.shape[-1] < 2:  # a line, or levels that handling errors already are
             continue
-        suspected.append(Driver(name, _columns(across(along, own, problem.axes)), ways=2, part="axes"))
+        suspected.append(Driver(name, _columns(across(along, driver_curve, problem.axes)), ways=2, part="axes"))
         turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
-        whole = np.broadcast_to(turned, (problem.blocks // problem.per_unit, *turned.shape[1:]))
-        columns = by_block(of_outputs(problem.lot, whole.reshape(*whole.shape[:3], -1)))
+        changes = np.broadcast_to(turned, (problem.blocks // problem.per_unit, *turned.shape[1:]))
+        columns = by_block(of_outputs(problem.lot, changes.reshape(*changes.shape[:3], -1)))
         suspected.append(Driver(name, _columns(columns, shared=True), part="axes"))
         columns = transfer(of_axes(along, problem.axes, 1), values, _FORCE_KNOTS)
         suspected.append(Driver(name, _columns(columns), part="transfer"))
@@ -122,7 +122,7 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
     """The curve that explains a lot better than the chosen effects, with the effects that remain; None if there is none."""
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
     full = Model(base.problem, [*base.terms, *chosen], near=base.noise)
-    whole, bare = cost_of_model(full), cost_of_model(base)
+    full_cost, base_cost = cost_of_model(full), cost_of_model(base)
     every = _promising(base, field)
     promising = [s for s in every if s.name not in held]
     fits = list(zip(fit_curves(base, promising, [*_noises(base), full.noise]), promising, strict=True))
@@ -132,18 +132,22 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
     best, suspect = min(fits, key=lambda pair: pair[0].cost)
     if any(fit.cost <= best.cost for fit in fit_curves(base, [s for s in every if s.name in held])):
         return None  # the recorded column that the effects hold already, in a shape of its own
-    kept: list[Term] = []
+    remaining: list[Term] = []
     if len(chosen) > 1:
         # the first two of its driver: a dependence of the bias, and levels
         alike = [s for s in field if s.name == suspect.name and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
-        worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (bare - best.cost))
-        best, kept = _with_others(base, chosen, alike, best, worth)
-    replaced = [t for t in chosen if t not in kept]
-    if not replaced or best.cost + (decisions.CURVE_AHEAD / len(replaced) if len(replaced) < 3 else 0.0) >= whole:
+        worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (base_cost - best.cost))
+        best, remaining = _with_others(base, chosen, alike, best, worth)
+    replaced = [t for t in chosen if t not in remaining]
+    if not replaced or best.cost + (decisions.CURVE_AHEAD / len(replaced) if len(replaced) < 3 else 0.0) >= full_cost:
         return None  # more than two effects in place of one curve have no priority
     # a memory for itself, too: what it leaves over, of inexact shape, is often chosen beside it
     rivals = [t for t in replaced if t.effect.memory or len(replaced) == 1]
-    return None if any(_nearly_as_good(base, [*kept, t], bare - best.cost) for t in rivals) else (best, kept)
+    return (
+        None
+        if any(_nearly_as_good(base, [*remaining, t], base_cost - best.cost) for t in rivals)
+        else (best, remaining)
+    )
 
 
 def _nearly_as_good(base: Model, terms: Sequence[Term], gain: float) -> bool:
@@ -171,7 +175,7 @@ def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
 
 
 def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
-    """The dependence that a curve beside a model is, the best of so many curves."""
+    """The unexplained dependence that a curve beside a model shows, the best of ``looks`` curves."""
     before = base.at(fit.model.noise)
     drop = max(before.rss - fit.model.space.rss, 0.0)
     log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
@@ -199,25 +203,25 @@ def _with_others(
     base: Model, chosen: Sequence[Term], suspect: Sequence[Driver], best: CurveFit, worth: float
 ) -> tuple[CurveFit, list[Term]]:
     """The best curve with the effects that it does not replace: no functions of its own driver, and above their price."""
-    kept: list[Term] = []
+    remaining: list[Term] = []
     for term in chosen:
         if _function_of(base, term, suspect[0]):
             continue
-        beside = Model(base.problem, [*base.terms, *kept, term], near=base.noise)
+        beside = Model(base.problem, [*base.terms, *remaining, term], near=base.noise)
         tried = fit_curves(beside, suspect)
         tried += [f for s in suspect[:1] if (f := _sharp(beside, s)) is not None]
         again = min(tried, key=lambda f: f.cost)
         if again.cost < best.cost - worth:
-            best, kept = again, [*kept, term]
-    return best, kept
+            best, remaining = again, [*remaining, term]
+    return best, remaining
 
 
 def _function_of(base: Model, term: Term, suspect: Driver) -> bool:
     """Whether a flexible curve of the driver, block by block, reproduces nine tenths of a term's columns."""
     columns = term.columns(base.problem)
     before = base.at(base.problem.covariance.white_noise())
-    whole = np.concatenate([base.local, suspect.candidate.of_blocks[:, :, 0, :]], axis=-1)
-    after = type(before)(before.covariance, before.noise, base.problem.y, whole, base.shared)
+    local = np.concatenate([base.local, suspect.candidate.of_blocks[:, :, 0, :]], axis=-1)
+    after = type(before)(before.covariance, before.noise, base.problem.y, local, base.shared)
     left = [float(np.sum(s.project(s.whiten(columns)) ** 2)) for s in (before, after)]
     return left[1] < 0.1 * left[0]
 
@@ -243,7 +247,7 @@ def _sharp(model: Model, suspect: Driver) -> CurveFit | None:
 
 
 def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
-    """Column of a bump whose place and width are refined between those of the grid."""
+    """Column of a bump whose position and width are refined between the values of the grid."""
     space = model.space
     column = np.zeros(0)
     for reach in (0.5, 0.2):
@@ -283,13 +287,13 @@ def _levels(values: Array) -> Array | None:
 
 
 def _alike(problem: Problem, columns: Array) -> Callable[[], Candidate]:
-    """Columns (units, n, d), the same for every axis."""
+    """Columns (units, n, d), equal on every axis."""
     each = columns if problem.lot.radial else np.repeat(columns, problem.per_unit, axis=0)
     return _columns(np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
 
 
 def _columns(columns: Array, *, shared: bool = False) -> Callable[[], Candidate]:
-    """Columns (blocks, n, d) that are kept: every search looks at them again."""
+    """Columns (blocks, n, d) that are stored: every search looks at them again."""
     candidate = Candidate(columns[:, :, None, :], shared=shared)
     return lambda: candidate
 
@@ -308,16 +312,16 @@ def _swing(problem: Problem, period: float) -> Driver:
 
 
 def _tuned(base: Model, fit: CurveFit) -> CurveFit:
-    """A swing with its period between those of the grid; any other curve as it is."""
+    """A swing with its period refined between the values of the grid; any other curve as it is."""
     if fit.driver.period is None:
         return fit
-    whole = float(np.ptp(base.problem.lot.state.time))
-    space, cycles = base.at(fit.model.noise), whole / fit.driver.period
+    duration = float(np.ptp(base.problem.lot.state.time))
+    space, cycles = base.at(fit.model.noise), duration / fit.driver.period
     for reach in _BETWEEN:
-        near = [_swing(base.problem, whole / (cycles + step * reach)) for step in (-2, -1, 0, 1, 2)]
+        near = [_swing(base.problem, duration / (cycles + step * reach)) for step in (-2, -1, 0, 1, 2)]
         worth = [float(space.gain(suspect.candidate).drop[0]) for suspect in near]
         cycles += (int(np.argmax(worth)) - 2) * reach
-    (tuned,) = fit_curves(base, [_swing(base.problem, whole / cycles)])
+    (tuned,) = fit_curves(base, [_swing(base.problem, duration / cycles)])
     tuned = replace(tuned, rank=tuned.rank + 1, cost=tuned.cost + PER_COEFFICIENT)
     return tuned if tuned.cost < fit.cost else fit
 

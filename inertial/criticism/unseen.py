@@ -38,7 +38,7 @@ _TO_SD = 1.4826
 
 
 def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[tuple[str, ...], InPart]:
-    """Effects that the plan cannot show, and those that it cannot show at some values, with these.
+    """Effects that the plan cannot show, and effects that it cannot show at some values, with the values.
 
     An effect is not visible if its columns are zero under the plan or equal to columns of the model, or if its quantities were
     not recorded.
@@ -57,13 +57,13 @@ def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> t
 
 
 def _at_rest(field: Candidates, effect: AnyEffect, gain: Gain) -> list[bool]:
-    """Whether an effect is visible at each place of its grid at which a run begins at rest."""
+    """Whether an effect is visible at each value of its grid at which a run begins at rest."""
     shown = zip(field.grids[effect.id], gain.rank > 0, strict=True)
     return [bool(there) for values, there in shown if at_rest(effect, values)]
 
 
 def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str, list[bool]]:
-    """Whether each effect with a memory is visible, by its place on the grid of its parameter.
+    """Whether each effect with a memory is visible, at every value on the grid of its parameter.
 
     A memory has an unknown state before the first dwell: with rising soaks, a play narrower than their steps is equivalent to
     this state and a bias. One unit is enough, as the plan is the same for all. For a play the scatter of the thermometer is
@@ -82,16 +82,16 @@ def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str,
         grid = resting_grid(effect, lot.state)
         alone = still if _follows_order_only(effect, lot.state, grid[0]) else plain
         noise = alone.problem.covariance.white_noise()
-        visible[effect.id] = [_shown(alone, noise, effect, place) for place in grid]
+        visible[effect.id] = [_shown(alone, noise, effect, values) for values in grid]
     return visible
 
 
-def _follows_order_only(effect: AnyEffect, state: State, place: dict[str, float]) -> bool:
+def _follows_order_only(effect: AnyEffect, state: State, values: dict[str, float]) -> bool:
     """Whether a memory depends on the order of what it follows and not on time, as a play does and a lag does not."""
     if not isinstance(effect, SensorEffect):
         return False
     once, slower = (
-        effect.columns(replace(state, time=factor * state.time, history=None, memory={}), 0, **place)
+        effect.columns(replace(state, time=factor * state.time, history=None, memory={}), 0, **values)
         for factor in (1.0, 2.0)
     )
     return bool(np.allclose(once, slower))
@@ -118,12 +118,12 @@ def without_scatter(state: State) -> State:
     return replace(state, temperature=level(state.temperature), history=history, memory={})
 
 
-def _shown(model: Model, noise: Noise, effect: AnyEffect, place: dict[str, float]) -> bool:
+def _shown(model: Model, noise: Noise, effect: AnyEffect, values: dict[str, float]) -> bool:
     """Whether the first column of an effect is visible beside the model and the possible initial state."""
     problem = model.problem
-    term = Term(effect, tuple(place.items()), 1)
+    term = Term(effect, tuple(values.items()), 1)
     # not model.with_curves: the noise of the model itself is not needed
-    beside = Model(problem, model.terms, curves=problem.start(effect, place))
+    beside = Model(problem, model.terms, curves=problem.start(effect, values))
     return bool(np.any(beside.at(noise).gain(term.candidate(problem)).rank[0]))
 
 
@@ -133,7 +133,7 @@ _DIGITS = 6
 
 @dataclass(frozen=True)
 class Smallest:
-    """The size of an effect, g rms over the dwells, that is detected; the same without slow noise."""
+    """The size of an effect, g rms over the dwells, that is detected, with slow noise and without it."""
 
     effect: str
     size: float
@@ -169,21 +169,21 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], effect:
     spaces : with the noise that was found, and with its white part alone
     least : RMS, g, of the part of an effect beyond the model below which it is never reported
     """
-    problem, places = model.problem, field.grids[effect.id]
+    problem, all_values = model.problem, field.grids[effect.id]
     values: list[Array] = []
     for piece in problem.pieces(effect, resting_grid(effect, problem.lot.state)):
         raw = np.sqrt(_squares(piece, problem.covariance.there) / problem.count)
         grid, p = piece.columns.shape[2:]
-        coefficients = float(p if piece.shared else problem.blocks * p) + len(places[0]) * (len(places) > 1)
+        coefficients = float(p if piece.shared else problem.blocks * p) + len(all_values[0]) * (len(all_values) > 1)
         needed = _needed(coefficients, field.looks, problem.count)
         each: list[Array] = []
         share = np.ones((grid, p))
         for space in spaces:
             found = space.products(piece)
             seen = np.diagonal(found.left, axis1=-2, axis2=-1).sum(axis=0)
-            whole = found.squares.sum(axis=0)
-            visible = seen > SEEN**2 * whole
-            share = np.where(visible, seen / np.where(visible, whole, 1.0), 0.0)
+            squares = found.squares.sum(axis=0)
+            visible = seen > SEEN**2 * squares
+            share = np.where(visible, seen / np.where(visible, squares, 1.0), 0.0)
             with np.errstate(over="ignore"):  # an almost invisible column would need an arbitrary size
                 factor = np.sqrt(needed / np.where(visible, seen, 1.0))
             visible &= np.isfinite(factor)

@@ -43,7 +43,7 @@ class Verdict:
     run, search, drivers : the examined lot, the search for effects in it, and the recorded quantities
     result : of the search; without effects where the data cannot judge the model
     final : the model with all identified effects
-    beside : the same with a curve that would else count as noise; drivers are judged at its noise
+    beside : that model with a curve that would else count as noise; drivers are judged at its noise
     unexplained : a driver that no effect explains
     removed : single dwells that were left out, those marked that are tails of the noise
     rms : of the residuals of the judged model; floor : of the noise of the measurement, white and wander
@@ -75,12 +75,12 @@ class Verdict:
 
     @property
     def problem(self) -> Problem:
-        """The series of that lot."""
+        """The series of the lot without handling errors and bad dwells."""
         return self.search.base.problem
 
     @property
     def handled(self) -> tuple[Named, ...]:
-        """Handling errors."""
+        """The handling errors that were found and corrected."""
         return tuple(self.run.handled)
 
     @property
@@ -103,7 +103,9 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     rng : draws the noise that adequacy is measured against
     """
     verdict = _judged(lot, effects, rng)
-    told = [m.term for one in verdict.run.handled for m in one.effects.members if isinstance(m.term.effect, Handling)]
+    told = [
+        m.term for named in verdict.run.handled for m in named.effects.members if isinstance(m.term.effect, Handling)
+    ]
     if not told or (verdict.unexplained is None and not verdict.result.added):
         return verdict
     # found before the driver or the effect was: what that leaves over may have looked like an error of handling
@@ -112,7 +114,7 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
 
 
 def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
-    """Whether the same explains a lot as well without the errors of handling that were told beside it."""
+    """Whether what explains a lot does so as well without the errors of handling that were named beside it."""
     if other.handled or _bad(other) > _bad(verdict) or _causes(other) != _causes(verdict):
         return False
     model = _as_found(other, verdict) if other.unexplained is None else other.unexplained.model
@@ -127,7 +129,7 @@ def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
 def _as_found(other: Verdict, verdict: Verdict) -> Model:
     """The model of a verdict with the effects as another one found them, and what each remembers from before the run free.
 
-    As they were found: an effect that changes its place to that of an error, as a step does, has replaced the error and does not
+    As they were found: an effect that moves to the dwell of an error, as a step does, has replaced the error and does not
     refute it. Devices that were not at rest leave something over in the first dwells: for that they take many coefficients, and a
     pose that was wrong there takes two.
     """
@@ -141,7 +143,7 @@ def _bad(verdict: Verdict) -> int:
 
 
 def _causes(verdict: Verdict) -> set[str]:
-    """The driver that nothing explains, else the effects."""
+    """The driver that no effect explains if there is one, else the ids of the effects."""
     if verdict.unexplained is not None:
         return {verdict.unexplained.driver}
     return {t.effect.id for t in verdict.result.added}
@@ -213,7 +215,7 @@ def _about_its_temperature(lot: Lot, effects: Sequence[str]) -> Lot:
 
 
 def _decided(searched: SearchResult, unexplained: Unexplained | None, looks: int) -> list[float]:
-    """Log probabilities, over all looks, of what is found where the adequacy of the whole does not decide; zero for nothing."""
+    """Log probabilities, over all looks, of what is found where the adequacy of the model does not decide; zero if nothing is."""
     first = [r.log_p + float(np.log(max(looks, 1))) for r in searched.ladder[:1] if searched.added]
     return [0.0, *first, *([] if unexplained is None else [unexplained.log_p])]
 
@@ -275,8 +277,8 @@ def _curve_in_place_of(
     better = better_curve(part.base, searched.added, suspected) if searched.added else None
     if better is None:
         return None
-    fit, kept = better
-    return Model(base.problem, [*base.terms, *kept]), unexplained_by(part.base, fit, len(suspected))
+    fit, terms = better
+    return Model(base.problem, [*base.terms, *terms]), unexplained_by(part.base, fit, len(suspected))
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:

@@ -53,7 +53,7 @@ def bad_dwells(model: Model, *, of_all: bool = False) -> list[BadDwell]:
         if not more:
             break
         bad += more
-        remaining = model_without(remaining, [d.place for d in more])
+        remaining = model_without(remaining, [d.index for d in more])
     return bad
 
 
@@ -154,7 +154,7 @@ class _Deletion:
         return self._squares().sum(axis=1)
 
     def _squares(self) -> Array:
-        """Its parts by axis, (units, axes, n)."""
+        """Square of the standardised deviation of each dwell by axis, (units, axes, n)."""
         return self._studentised(np.where(self.known, self.left**2 / self.known_size, 0.0))
 
     def _studentised(self, drop: Array) -> Array:
@@ -173,14 +173,14 @@ class _Deletion:
         """Take one dwell out; its deviation, (axes,), g."""
         blocks = range(unit * self.axes, (unit + 1) * self.axes)
         off = np.array([self.left[b, dwell] / self.size[b, dwell] for b in blocks])
-        for place, b in enumerate(blocks):
+        for axis, b in enumerate(blocks):
             self.squares[b] -= self.left[b, dwell] ** 2 / self.size[b, dwell]
             self.dof[b] -= 1.0
             column = self.space.projector_at(b, dwell) * self.space.noise.scale[b] ** 2
             for gone in np.flatnonzero(~self.there[b] & self.space.covariance.there[b]).tolist():
                 first = self.space.projector_at(b, gone) * self.space.noise.scale[b] ** 2
                 column = column - first * float(first[dwell] / max(first[gone], 1e-300))
-            self.left[b] -= column * off[place]
+            self.left[b] -= column * off[axis]
             self.size[b] = np.maximum(self.size[b] - column**2 / max(float(column[dwell]), 1e-300), 0.0)
             self.there[b, dwell] = False
         return off

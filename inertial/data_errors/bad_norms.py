@@ -54,7 +54,7 @@ def bad_norms(model: Model) -> list[BadDwell]:
         # of nested sets the smaller one, unless the larger is far more probable
         _, best = min(certain, key=lambda each: each[0] + 4.0 * len(each[1]))
         bad += best
-        model = model_without(model, [d.place for d in best])
+        model = model_without(model, [d.index for d in best])
 
 
 def _suspicions(model: Model) -> list[tuple[int, tuple[int, ...]]]:
@@ -66,13 +66,13 @@ def _suspicions(model: Model) -> list[tuple[int, tuple[int, ...]]]:
         space = model.at(Noise(noise, model.noise.scale, model.noise.prior))
         for unit in range(model.problem.lot.state.time.shape[0]):
             p, py = _projector(model, Noise(noise, model.noise.scale, model.noise.prior), unit)
-            for size, drop, places in _drops(p, py):
+            for size, drop, dwells in _drops(p, py):
                 left = np.maximum(space.rss - drop, 1e-300) / max(space.dof - size, 1)
                 log_p = log_f_tail(drop / size / left, size, max(space.dof - size, 1))
                 order = np.argsort(log_p)[:_TRIED]
                 for k in order.tolist():
                     if log_p[k] + _looks(model, size) < 0.0:
-                        chosen[unit, places[k]] = None
+                        chosen[unit, dwells[k]] = None
     return list(chosen)
 
 
@@ -92,18 +92,18 @@ def _projector(model: Model, noise: Noise, unit: int) -> tuple[Array, Array]:
 
 
 def _drops(p: Array, py: Array) -> list[tuple[int, Array, list[tuple[int, ...]]]]:
-    """Reduction of the sum of squares by deleting every single dwell, and every pair; with their places."""
-    own = np.diagonal(p)
-    sound = np.flatnonzero(own > _HANGING * max(float(own.max()), 1e-300))
-    singles = py[sound] ** 2 / own[sound]
+    """Reduction of the sum of squares by deleting every single dwell, and every pair; with the indices of the dwells."""
+    diagonal = np.diagonal(p)
+    sound = np.flatnonzero(diagonal > _HANGING * max(float(diagonal.max()), 1e-300))
+    singles = py[sound] ** 2 / diagonal[sound]
     drops: list[tuple[int, Array, list[tuple[int, ...]]]] = [(1, singles, [(int(k),) for k in sound])]
     if not 2 <= sound.size <= _LONG:
         return drops
     i, j = (sound[k] for k in np.triu_indices(sound.size, 1))
-    area = own[i] * own[j] - p[i, j] ** 2
-    fair = area > 1e-3 * own[i] * own[j]
+    area = diagonal[i] * diagonal[j] - p[i, j] ** 2
+    fair = area > 1e-3 * diagonal[i] * diagonal[j]
     i, j, area = i[fair], j[fair], area[fair]
-    pairs = (own[j] * py[i] ** 2 - 2.0 * p[i, j] * py[i] * py[j] + own[i] * py[j] ** 2) / area
+    pairs = (diagonal[j] * py[i] ** 2 - 2.0 * p[i, j] * py[i] * py[j] + diagonal[i] * py[j] ** 2) / area
     best = np.argsort(pairs)[::-1][: 4 * _TRIED]
     return [*drops, (2, pairs[best], [(int(i[k]), int(j[k])) for k in best])]
 
@@ -114,14 +114,14 @@ def _variance(rest: Model, unit: int) -> tuple[float, int]:
     Fifteen degrees of freedom know a variance to a third. Where the white noise is recorded in the samples of each dwell, and
     what the others leave agrees with it, the record counts as further degrees of freedom.
     """
-    own, dof = max(rest.space.variance, 1e-300), rest.space.dof
+    variance, dof = max(rest.space.variance, 1e-300), rest.space.dof
     if not rest.problem.lot.recorded:
-        return own, dof
+        return variance, dof
     scale = float(rest.noise.scale[unit]) ** 2
     low, high = chi2_quantile([0.5 * AGREES, 1.0 - 0.5 * AGREES], dof) / dof
-    if not low < own * scale < high:
-        return own, dof
-    return (dof * own + RECORDED_DOF / scale) / (dof + RECORDED_DOF), dof + RECORDED_DOF
+    if not low < variance * scale < high:
+        return variance, dof
+    return (dof * variance + RECORDED_DOF / scale) / (dof + RECORDED_DOF), dof + RECORDED_DOF
 
 
 def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> tuple[float, list[BadDwell]]:
@@ -131,13 +131,13 @@ def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> tuple[float, li
         return 0.0, []
     noise = model.problem.covariance.rescaled(rest.noise, rest.problem.covariance)
     p, py = _projector(model, noise, unit)
-    own = p[np.ix_(dwells, dwells)]
-    off = np.linalg.solve(own, py[list(dwells)])
+    projector = p[np.ix_(dwells, dwells)]
+    off = np.linalg.solve(projector, py[list(dwells)])
     size = len(dwells)
     variance, dof = _variance(rest, unit)
     statistic = float(py[list(dwells)] @ off) / variance
     log_p = float(log_f_tail(statistic / size, size, dof)) + _looks(model, size)
-    deviations = np.abs(off) / np.sqrt(np.diagonal(np.linalg.inv(own)) * variance)
+    deviations = np.abs(off) / np.sqrt(np.diagonal(np.linalg.inv(projector)) * variance)
     if size > 1:
         # each must be bad by itself beside the other
         each = log_f_tail(deviations**2, 1, dof) + _looks(model, 1)

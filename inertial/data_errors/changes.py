@@ -11,7 +11,7 @@ from inertial.estimation.lot import Lot
 AXES = "xyz"
 
 _EVERY = 160
-"""Dwells up to which each is a place of a jump."""
+"""Largest number of dwells for which a jump is searched at every dwell."""
 
 
 def every_dwell(lot: Lot) -> list[int]:
@@ -35,13 +35,13 @@ class Change(Handling):
         """Dwells from which on the change is searched."""
         return times(lot)
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
-        """Every place in time."""
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
+        """The dwells from which on a change is possible."""
         return [{"dwell": float(k)} for k in self.moments(lot)]
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The addition from the dwell on."""
-        return self.addition(lot) * after(lot, place["dwell"])[:, None, None]
+        return self.addition(lot) * after(lot, location["dwell"])[:, None, None]
 
 
 class OfOneUnit(Handling):
@@ -49,20 +49,20 @@ class OfOneUnit(Handling):
 
     in_part = False
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
-        """Every unit at every place of the error of all units."""
-        places = super().places(lot)
-        return [{"unit": float(u), **place} for u in range(lot.state.time.shape[0]) for place in places]
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
+        """Every unit at every location of the error of all units."""
+        of_lot = super().locations(lot)
+        return [{"unit": float(u), **location} for u in range(lot.state.time.shape[0]) for location in of_lot]
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The columns of the unit."""
-        of_units = self.of_each_unit(lot, slope, **place)
-        unit = int(place["unit"])
+        of_units = self.of_each_unit(lot, slope, **location)
+        unit = int(location["unit"])
         return of_units[unit : unit + 1] if len(of_units) > 1 else of_units
 
-    def of_each_unit(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def of_each_unit(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The columns of the error of all units."""
-        return super().change(lot, slope, **place)
+        return super().change(lot, slope, **location)
 
 
 class OfOneAxis(Handling):
@@ -73,19 +73,19 @@ class OfOneAxis(Handling):
     of_one_axis = True
 
     @abstractmethod
-    def levels(self, lot: Lot, **place: float) -> Array:
+    def levels(self, lot: Lot, **location: float) -> Array:
         """Columns (n, k) of the axis."""
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The columns of the axis; none in the others."""
-        levels = self.levels(lot, **place)
+        levels = self.levels(lot, **location)
         column = np.zeros((1, len(levels), len(lot.state.axes), levels.shape[-1]))
-        column[0, :, int(place["axis"])] = levels
+        column[0, :, int(location["axis"])] = levels
         return column
 
-    def of_each_unit(self, lot: Lot, slope: Array | None, **place: float) -> Array:
-        """The same for every unit."""
-        return self.change(lot, slope, **place)
+    def of_each_unit(self, lot: Lot, slope: Array | None, **location: float) -> Array:
+        """The columns of the axis, equal in every unit."""
+        return self.change(lot, slope, **location)
 
 
 class DirectionOff(Handling):
@@ -97,24 +97,24 @@ class DirectionOff(Handling):
     symbol = "Δα, Δβ"
     which: ClassVar[str]
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The two errors in the dwells."""
-        here = np.isin(np.arange(lot.state.time.shape[1]), self.dwells(lot, **place))
+        here = np.isin(np.arange(lot.state.time.shape[1]), self.dwells(lot, **location))
         return pose_errors(lot.state) * here[:, None, None]
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         """The two angles of a table; of stated forces the angle between the two directions."""
         angles = np.degrees(size)
         if lot.state.outer is None:
             return f"the pose was off by about {float(np.linalg.norm(angles)):.3f}° {self.which}"
         return f"the pose was off by about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner) {self.which}"
 
-    def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
+    def mended(self, lot: Lot, size: Array, **location: float) -> Lot | None:
         """Without the dwells."""
-        return without(lot, self.dwells(lot, **place))
+        return without(lot, self.dwells(lot, **location))
 
 
 def axes_of_units(lot: Lot) -> list[dict[str, float]]:
-    """Every axis of every unit, as places."""
+    """Every axis of every unit, as locations."""
     units = lot.state.time.shape[0]
     return [{"unit": float(u), "axis": float(axis)} for u in range(units) for axis in range(len(lot.state.axes))]

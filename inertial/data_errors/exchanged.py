@@ -64,8 +64,8 @@ class PlainFit:
     def pairs(self) -> Iterator[tuple[int, int]]:
         """Pairs of units, each of which has the residuals that are most opposite to the other's."""
         units = len(self.left)
-        own = self.left - np.median(self.left, axis=0) if units >= _MANY else self.left
-        flat = own.reshape(units, -1)
+        deviations = self.left - np.median(self.left, axis=0) if units >= _MANY else self.left
+        flat = deviations.reshape(units, -1)
         size = np.linalg.norm(flat, axis=1)
         flat = flat / np.where(size > 0.0, size, 1.0)[:, None]
         alike = flat @ flat.T
@@ -75,31 +75,31 @@ class PlainFit:
             if alike[a, partner[a]] < _OPPOSITE:
                 yield a, int(partner[a])
 
-    def ranges(self, one: int, other: int, around: int = AROUND) -> list[tuple[int, int]]:
+    def ranges(self, unit: int, partner: int, around: int = AROUND) -> list[tuple[int, int]]:
         """Ranges of dwells (first, end) in which an exchange of two units leaves least; none if it leaves too much.
 
         The end of most is that of the record; units that came back into their seats before it were exchanged for a while. Beside
         the best range others whose first or whose last dwell is near.
         """
-        pair = [one, other]
+        pair = [unit, partner]
         changes = self._changes(pair)
         n = self.there.shape[1]
         first, end = np.arange(EDGE, n - EDGE + 1), np.append(np.arange(2 * EDGE, n - EDGE + 1), n)
-        whole = float(np.sum(self.left[pair] ** 2))
-        if whole <= 0.0 or not first.size:
+        total = float(np.sum(self.left[pair] ** 2))
+        if total <= 0.0 or not first.size:
             return []
         lasting = (int(first[np.argmin(_left_by(changes, first, end[-1:])[:, 0])]), n)
         each = [_best_of(changes, first[k : k + _TOGETHER], end) for k in range(0, first.size, _TOGETHER)]
         found: dict[tuple[int, int], float] = {}
         for a, b in {lasting, min(each)[1]}:
-            if whole + float(_left_by(changes, np.array([a]), np.array([b]))[0, 0]) > _LEFT * whole:
+            if total + float(_left_by(changes, np.array([a]), np.array([b]))[0, 0]) > _LEFT * total:
                 continue
             near = [(k, b) for k in range(a - around, a + around + 1)]
             near += [(a, k) for k in range(b - around, b + around + 1) if b < n]
             for k, m in near:
                 if first[0] <= k <= first[-1] and k + EDGE <= m <= (n if b == n else n - EDGE):
                     found[k, m] = float(_left_by(changes, np.array([k]), np.array([m]))[0, 0])
-        return sorted(found, key=lambda one: found[one])
+        return sorted(found, key=lambda dwells: found[dwells])
 
     def _changes(self, pair: list[int]) -> list[tuple[Array, Array]]:
         """Running sums for each unit and axis, of dᵀd + 2·rᵀd, (n + 1,), and of Qᵀd, (n + 1, k).
@@ -135,5 +135,5 @@ def _best_of(changes: Sequence[tuple[Array, Array]], first: Places, end: Places)
 
 
 def _running(values: Array) -> Array:
-    """Sums (n + 1, …) of the values (n, …) before each place."""
+    """Sums (n + 1, …) of the values (n, …) before each index."""
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])

@@ -155,18 +155,18 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
 class Split:
     """A change of calibration in the middle of a run.
 
-    place : first dwell after it; before, after : (4, 3), bias and response on both sides; ratio : of the scales
+    dwell : first after it; before, after : (4, 3), bias and response on both sides; ratio : of the scales
     """
 
-    place: int
+    dwell: int
     before: Array
     after: Array
 
     @property
     def ratio(self) -> float:
         """Scale after over scale before."""
-        one, two = (float(np.sqrt(np.sum(k[1:] ** 2))) for k in (self.before, self.after))
-        return two / max(one, 1e-300)
+        before, after = (float(np.sqrt(np.sum(k[1:] ** 2))) for k in (self.before, self.after))
+        return after / max(before, 1e-300)
 
 
 _LEAST = 6  # dwells on either side of a split: a response and a bias need four
@@ -176,7 +176,7 @@ _FIXED = 1e-9  # eigenvalue of the products, over the largest, below which poses
 
 
 def find_split(force: Array, output: Array) -> Split | None:
-    """The place at which two calibrations explain a run far better than one; None if one is enough.
+    """The dwell from which on another calibration explains a run far better than one does; None if one is enough.
 
     Two fits must leave less than a twentieth of the squares of one, and differ by more than a hundredth of
     the scale: no physical effect changes a sensor so.
@@ -185,29 +185,29 @@ def find_split(force: Array, output: Array) -> Split | None:
     if there.size < 2 * _LEAST + 1:
         return None
     f, y = force[there], output[there]
-    whole = _plain_fit(f, y)[1]
-    places = np.arange(_LEAST, there.size - _LEAST)
-    if _far_from_split(f, y, places):
+    total = _plain_fit(f, y)[1]
+    cuts = np.arange(_LEAST, there.size - _LEAST)
+    if _far_from_split(f, y, cuts):
         return None
-    coarse = places[:: max(1, places.size // 24)]
+    coarse = cuts[:: max(1, cuts.size // 24)]
     errors = [_plain_fit(f[:p], y[:p])[1] + _plain_fit(f[p:], y[p:])[1] for p in coarse]
     centre = int(coarse[int(np.argmin(errors))])
-    near = places[np.abs(places - centre) <= max(1, places.size // 24)]
+    near = cuts[np.abs(cuts - centre) <= max(1, cuts.size // 24)]
     errors = [_plain_fit(f[:p], y[:p])[1] + _plain_fit(f[p:], y[p:])[1] for p in near]
     best = int(near[int(np.argmin(errors))])
     before, after = _plain_fit(f[:best], y[:best])[0], _plain_fit(f[best:], y[best:])[0]
     apart = float(np.max(np.abs(after - before))) > 0.01 * float(np.sqrt(np.sum(before[1:] ** 2) / before.shape[1]))
-    return Split(int(there[best]), before, after) if min(errors) < _BETTER * whole and apart else None
+    return Split(int(there[best]), before, after) if min(errors) < _BETTER * total and apart else None
 
 
-def _far_from_split(force: Array, output: Array, places: Places) -> bool:
-    """Whether no place comes near to what a split needs, by the products of all dwells up to each place."""
+def _far_from_split(force: Array, output: Array, cuts: Places) -> bool:
+    """Whether no split of the dwells (k,) comes near to what is needed, by the products of all dwells up to each."""
     x = design(force)
     left = output - x @ np.linalg.lstsq(x, output, rcond=1e-9)[0]
     both = np.concatenate([x, left], axis=-1)
     before = np.cumsum(both[:, :, None] * both[:, None, :], axis=0)
-    squares = np.zeros(len(places))
-    for gram in (before[places - 1], before[-1] - before[places - 1]):
+    squares = np.zeros(len(cuts))
+    for gram in (before[cuts - 1], before[-1] - before[cuts - 1]):
         values, vectors = np.linalg.eigh(gram[:, :4, :4])
         along = np.swapaxes(vectors, -1, -2) @ gram[:, :4, 4:]
         known = values > _FIXED * values[:, -1:]
@@ -223,9 +223,9 @@ def _plain_fit(force: Array, output: Array) -> tuple[Array, float]:
 
 
 def exchanged(split: Split, other: Split) -> bool:
-    """Whether two units took over each other's calibration at the same place."""
-    if abs(split.place - other.place) > 2:
+    """Whether two units took over each other's calibration at the same dwell."""
+    if abs(split.dwell - other.dwell) > 2:
         return False
-    own = float(np.linalg.norm(split.after - split.before)) + float(np.linalg.norm(other.after - other.before))
+    apart = float(np.linalg.norm(split.after - split.before)) + float(np.linalg.norm(other.after - other.before))
     crossed = float(np.linalg.norm(split.after - other.before)) + float(np.linalg.norm(other.after - split.before))
-    return crossed < 0.3 * own
+    return crossed < 0.3 * apart

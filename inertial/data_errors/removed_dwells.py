@@ -10,15 +10,15 @@ from inertial.estimation.lot import Lot
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 
-Place = tuple[int, int]
-"""A unit and its dwell."""
+DwellIndex = tuple[int, int]
+"""Indices of a unit and of its dwell."""
 
 
 @dataclass(frozen=True)
 class BadDwell:
     """A dwell of one unit: its deviation from its neighbours in time and the model.
 
-    off : (axes,), g; by_axis : (axes,), the same in standard deviations; tail : whether the noise of the run reaches as far
+    off : (axes,), g; by_axis : (axes,), in standard deviations; tail : whether the noise of the run reaches as far
     """
 
     unit: int
@@ -28,8 +28,8 @@ class BadDwell:
     tail: bool = False
 
     @property
-    def place(self) -> Place:
-        """Its unit and dwell."""
+    def index(self) -> DwellIndex:
+        """Indices of its unit and dwell."""
         return self.unit, self.dwell
 
     @property
@@ -38,15 +38,15 @@ class BadDwell:
         return float(np.linalg.norm(self.by_axis))
 
 
-def without(lot: Lot, places: Iterable[Place]) -> Lot:
+def without(lot: Lot, removed: Iterable[DwellIndex]) -> Lot:
     """The lot without some dwells of some units."""
     error = lot.error.copy()
-    for place in places:
-        error[place] = np.inf
+    for index in removed:
+        error[index] = np.inf
     return replace(lot, error=error)
 
 
-def model_without(model: Model, places: Iterable[Place]) -> Model:
+def model_without(model: Model, removed: Iterable[DwellIndex]) -> Model:
     """The model in the lot without some dwells, its noise estimated again."""
-    problem = Problem(without(model.problem.lot, places), slope=model.problem.slope)
+    problem = Problem(without(model.problem.lot, removed), slope=model.problem.slope)
     return Model(problem, model.terms, near=model.noise)

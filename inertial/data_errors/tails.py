@@ -36,7 +36,7 @@ _DOF = 3.0
 """Degrees of freedom of the heavy part: P(|x| > z) falls off as z⁻³."""
 
 _SCALES = np.geomspace(0.7, 1.3, 25)
-"""Standard deviations of the noise over the RMS of the dwells that were kept."""
+"""Standard deviations of the noise over the RMS of the dwells that were not left out."""
 
 _FURTHEST, _STEP = 60.0, 0.02
 """Range and step of the tables, standard deviations."""
@@ -87,9 +87,9 @@ class _Noise:
         for k in range(len(_SHARES)):
             grid, density, _ = _table(k)
             for j, s in enumerate(scale.tolist()):
-                kept = 1.0 - float(_probability_beyond(k, np.array([below / s]))[0])
+                below_limit = 1.0 - float(_probability_beyond(k, np.array([below / s]))[0])
                 each = np.log(np.maximum(np.interp(inside / s, grid, density), 1e-300))
-                log[k, j] = float(each.sum()) - inside.size * np.log(s * max(kept, 1e-12))
+                log[k, j] = float(each.sum()) - inside.size * np.log(s * max(below_limit, 1e-12))
         prior = np.where(_WEIGHTS > 0.0, TAILS * _WEIGHTS, 1.0 - TAILS)
         weight = np.exp(log - log.max()) * prior[:, None]
         return _Noise(weight / weight.sum(), scale)
@@ -99,28 +99,28 @@ class _Noise:
         length, axes = float(np.linalg.norm(by_axis)), len(by_axis)
         total = 0.0
         for k in range(len(_SHARES)):
-            whole = axes * _probability_beyond(k, length / self.scale)
+            single_axis = axes * _probability_beyond(k, length / self.scale)
             each = np.stack([_probability_beyond(k, abs(float(v)) / self.scale) for v in by_axis])
             together = chi2_tail(-2.0 * np.log(np.maximum(each, 1e-300)).sum(axis=0), 2.0 * axes)
-            least = np.minimum(2.0 * dwells * np.minimum(whole, together), 1.0)
+            least = np.minimum(2.0 * dwells * np.minimum(single_axis, together), 1.0)
             total += float(np.sum(self.weight[k] * least))
         return total
 
 
-def _probability_beyond(place: int, z: Array) -> Array:
-    """P(|x| > z) of a value of variance one; ``place`` is the index of the share of its heavy tails."""
-    share = _SHARES[place]
+def _probability_beyond(index: int, z: Array) -> Array:
+    """P(|x| > z) of a value of variance one; ``index``: of its share of heavy tails in ``_SHARES``."""
+    share = _SHARES[index]
     if share == 0.0:
         return 2.0 * normal_tail(z)
-    grid, _, distribution = _table(place)
+    grid, _, distribution = _table(index)
     near = 2.0 * (1.0 - np.interp(z, grid, distribution))
     return np.where(z < _TAIL, near, 2.0 * student_tail(z / np.sqrt(share / _DOF), _DOF))
 
 
 @cache
-def _table(place: int) -> tuple[Array, Array, Array]:
+def _table(index: int) -> tuple[Array, Array, Array]:
     """Values from zero on, density and distribution of a normal part plus a heavy one, together of variance one."""
-    share, half = _SHARES[place], round(_FURTHEST / _STEP)
+    share, half = _SHARES[index], round(_FURTHEST / _STEP)
     grid = _STEP * np.arange(-half, half + 1)
     edges = np.append(grid - 0.5 * _STEP, grid[-1] + 0.5 * _STEP)
     mass = np.diff(normal_tail(-edges / max(np.sqrt(1.0 - share), 1e-9)))

@@ -17,7 +17,7 @@ from inertial.discovery.station_wander import over
 
 @dataclass(frozen=True)
 class Correlation:
-    """Two coefficients of an axis, by their places: evidence, correlation of the devices' own values, its standard error."""
+    """Two coefficients of an axis, by their indices: evidence, correlation of the devices' own values, its standard error."""
 
     axis: int
     first: int
@@ -60,14 +60,14 @@ class Correlations:
         log_e = _evidence(pairs)
         variance = np.diagonal(every.sum(axis=0), axis1=1, axis2=2)  # (axes, p), of the devices' own values
         both = np.sqrt(np.maximum(variance[:, first] * variance[:, second], 0.0)).reshape(-1)
-        own = (variance[:, first] > 0.0) & (variance[:, second] > 0.0)
+        known = (variance[:, first] > 0.0) & (variance[:, second] > 0.0)
         value, error = over(pairs.sum(axis=0), both), over(np.sqrt((pairs**2).sum(axis=0)), both)
         out = [
             Correlation(k // first.size, int(first[k % first.size]), int(second[k % first.size]), *row)
             for k, row in enumerate(zip(log_e.tolist(), value.tolist(), error.tolist(), strict=True))
-            if row[0] >= needed and own.reshape(-1)[k]
+            if row[0] >= needed and known.reshape(-1)[k]
         ]
-        return sorted(out, key=lambda one: -one.log_e)
+        return sorted(out, key=lambda pair: -pair.log_e)
 
 
 def _evidence(increments: Array) -> Array:

@@ -96,10 +96,10 @@ def weights_of(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
         out[:, 0] = np.where(np.isfinite(numbers), numbers - sums.about, 0.0)
     else:
         labels = (lot.station,) * units if driver == STATION else lot.levels.get(driver, ())
-        place = {label: k for k, label in enumerate(sums.labels)}
+        column = {label: k for k, label in enumerate(sums.labels)}
         for unit, label in enumerate(labels):
-            if label in place:
-                out[unit, place[label]] = 1.0
+            if label in column:
+                out[unit, column[label]] = 1.0
     return out
 
 
@@ -147,7 +147,7 @@ def _gather(
 ) -> None:
     """Add a lot to the sums of drivers; a unit that was measured once says nothing of what stays with a unit."""
     noise, within = scale
-    own, total, info, left = lot.own, lot.total, lot.information, lot.inside[0]
+    by_unit, total, info, left = lot.own, lot.total, lot.information, lot.inside[0]
     sums = np.where(info > 0.0, lot.score.sum(axis=0), 0.0)
     units = len(lot.units)
     for name, of in out.items():
@@ -162,13 +162,13 @@ def _gather(
         elif name == UNIT or name in lot.levels:
             labels = lot.units if name == UNIT else lot.levels[name]
             for label in dict.fromkeys(labels):
-                here = np.array([one == label for one in labels])
-                mine = own[here].sum(axis=0)
+                here = np.array([other == label for other in labels])
+                of_level = by_unit[here].sum(axis=0)
                 score = left[here].sum(axis=0) / within
-                information = mine * (1.0 - mine / total) / within
+                information = of_level * (1.0 - of_level / total) / within
                 of.inside += float(information.sum())
                 if name not in INSIDE_ONLY:  # and what the lot has in common
-                    share = mine / total
+                    share = of_level / total
                     score = score + share * sums / noise
                     common = share**2 * info / noise
                     information = information + common
@@ -182,9 +182,9 @@ def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array
     lot, left, mean, noise, within = parts
     if not np.isfinite(numbers).all():
         return
-    own, centre = lot.own, float(numbers.mean())
+    by_unit, centre = lot.own, float(numbers.mean())
     about = numbers[:, None] - lot.averaged(numbers[:, None])
     score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
-    inside, between = (about**2 * own).sum(axis=0) / within, centre**2 * lot.information / noise
+    inside, between = (about**2 * by_unit).sum(axis=0) / within, centre**2 * lot.information / noise
     of.inside, of.between = of.inside + float(inside.sum()), of.between + float(between.sum())
     of.add("slope", score, inside + between, len(lot.units))

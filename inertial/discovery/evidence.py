@@ -127,8 +127,8 @@ class Evidence:
     @property
     def noise(self) -> tuple[Array, Array]:
         """Standard deviations (h,) over the stated ones: of lots about their stations, of units inside lots; one at first."""
-        one = np.ones(self.count)
-        both = (self._scales[name].rms if name in self._scales else one for name in ("between", "inside"))
+        stated = np.ones(self.count)
+        both = (self._scales[name].rms if name in self._scales else stated for name in ("between", "inside"))
         return next(both), next(both)
 
     def shared_by_stations(self) -> Flags:
@@ -215,8 +215,8 @@ class Evidence:
         """Stations that differ for good: each lot against what its station's earlier ones predict."""
         table = self.levels.setdefault(STATION, Levels(self.count))
         prior, centre = SHRUNK * self._typical, self._centre()
-        (whole,), (behind,) = table.predicted((lot.station,), prior)
-        predicted = whole - centre * over(behind, behind + prior)
+        (of_station,), (behind,) = table.predicted((lot.station,), prior)
+        predicted = of_station - centre * over(behind, behind + prior)
         scale = self._scales["between"]
         left = scale.bounded(np.where(seen, (size - centre) * np.sqrt(safe), 0.0))
         x = left / scale.rms * np.clip(predicted * np.sqrt(safe) / scale.rms, -BOUND, BOUND)
@@ -230,7 +230,7 @@ class Evidence:
         A level is predicted by the lots of other stations, where there are some: what wanders with one station is no news there.
         """
         scale, prior = self._scales["between"], SHRUNK * self._typical
-        rms, own, ratio = scale.rms, lot.own, lot.information / lot.total
+        rms, by_unit, ratio = scale.rms, lot.own, lot.information / lot.total
         raw = np.abs(found.value)
         part = np.where(raw > 0.0, np.minimum(1.0, BOUND * rms / np.where(raw > 0.0, raw, 1.0)), 1.0)
         for name, labels in lot.levels.items():
@@ -243,9 +243,9 @@ class Evidence:
             prediction, told = lot.averaged(each), lot.averaged(behind) >= prior
             value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, told)
             self._sums(name, two_sided=False).add(scale.bounded(value) / rms * np.clip(left / rms, -BOUND, BOUND))
-            score = (lot.score - own * ratio * self._centre()) * part
+            score = (lot.score - by_unit * ratio * self._centre()) * part
             for each_table in (table, here):
-                each_table.add(labels, score, own * ratio)
+                each_table.add(labels, score, by_unit * ratio)
         for name, numbers in {DATE: np.array([lot.day]), **lot.numbers}.items():
             known = numbers[np.isfinite(numbers)]
             standing = self._standing(name, float(known.mean())) if known.size else None
@@ -266,7 +266,7 @@ class Evidence:
 
     def _inside(self, lot: ScoredLot) -> None:
         """Drivers that differ between the units of a lot: what the lot has in common cancels."""
-        own = lot.own
+        by_unit = lot.own
         free, information = lot.inside
         root = np.sqrt(information)
         scale, typical = self._scales["inside"], self._typical
@@ -284,18 +284,18 @@ class Evidence:
             if len(set(labels)) > 1:
                 self._add_inside(inside, lot, predicted, left, two_sided=False)
             if name != UNIT:
-                alike = np.array([own[[other == label for other in labels]].sum(axis=0) for label in labels])
-                self.levels[inside].add(labels, left, own * (1.0 - alike / lot.total))
+                alike = np.array([by_unit[[other == label for other in labels]].sum(axis=0) for label in labels])
+                self.levels[inside].add(labels, left, by_unit * (1.0 - alike / lot.total))
         for name, numbers in lot.numbers.items():
             if np.isfinite(numbers).all() and float(np.ptp(numbers)) > 0.0:
-                predicted = np.broadcast_to(numbers[:, None], own.shape)
+                predicted = np.broadcast_to(numbers[:, None], by_unit.shape)
                 self._add_inside(name + INSIDE, lot, predicted, left, two_sided=True)
         self._slopes(lot, left)
         scale.add(np.sqrt(np.mean(over(left, root) ** 2, axis=0)))
         if self._earlier is None:
-            for unit, *own in zip(lot.units, left, information, strict=True):
+            for unit, *sums in zip(lot.units, left, information, strict=True):
                 score, known = self._units.get(unit, (0.0, 0.0))
-                self._units[unit] = score + own[0], known + own[1]
+                self._units[unit] = score + sums[0], known + sums[1]
 
     def _slopes(self, lot: ScoredLot, left: Array) -> None:
         """Numbers that differ by axis, too, and the sums that their slopes are estimated from."""
@@ -317,10 +317,10 @@ class Evidence:
 
     def _of_units(self, units: tuple[str, ...]) -> Array:
         out = np.zeros((len(units), self.count))
-        for place, unit in enumerate(units):
+        for row, unit in enumerate(units):
             before = self._units.get(unit) if self._earlier is None else self._earlier(unit, self._taken)
             if before is not None:
-                out[place] = over(*before)
+                out[row] = over(*before)
         return out
 
     def arrays(self) -> dict[str, NDArray[Any]]:

@@ -28,7 +28,7 @@ _TURNS = 5  # of a fit of columns, and of levels, that share lots
 _INEXACT = 0.02
 """Part of a score that is not known: products of columns are means over lots, effects are at the middle of their range."""
 
-_SEEN = 1e-3  # share of its information that a column keeps beside another one, below which it is the same
+_SEEN = 1e-3  # share of its information that a column keeps beside another one, below which the two are one column
 
 _OF_POSE = 0.5
 """Part of a name's score that a function of the pose loses with it where the name is one: all of a static effect's, and next to
@@ -44,7 +44,7 @@ _REMAINDER = 0.03
 class Name:
     """An effect that an archive holds, with its driver.
 
-    effects, drivers : classes, best first · sizes : (levels, axes), rms in a dwell, g; errors the same, one standard error
+    effects, drivers : classes, best first · sizes : (levels, axes), rms in a dwell, g; errors : their standard errors
     labels, weights : of the levels · score : of the best
     """
 
@@ -94,7 +94,7 @@ class Pool:
 
         Parameters
         ----------
-        alarms : driver and effect that have one
+        alarms : pairs of driver and effect with an alarm
         needed : score from which on something is named
         """
         alarmed = {(name.removesuffix(INSIDE), effect) for name, effect in alarms}
@@ -113,21 +113,24 @@ class Pool:
                 if effect != SHAPE
                 and score > needed
                 and again[name][effect] > np.sqrt(2.0 * needed)
-                # what is left of others rises to a name only where it had an alarm of its own, and stands out
+                # what other names leave over is named only where it had an alarm itself, and stands out
                 and (not found or ((name, effect) in alarmed and score > needed + CLASS_WIDTH))
             ]
-            name = next((one for one in self._in_order(pairs, sums, scores) if not self._told(found, one)), None)
+            name = next(
+                (candidate for candidate in self._in_order(pairs, sums, scores) if not self._told(found, candidate)),
+                None,
+            )
             if name is None or len(found) == _MOST:
                 break
             found.append(name)
             lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
         imitations = _imitations(found, of_pose, needed)
-        kept = [name for at, name in enumerate(found) if at not in imitations]
-        if len(kept) < len(found):
+        genuine = [name for at, name in enumerate(found) if at not in imitations]
+        if len(genuine) < len(found):
             lots = every
-            for name in kept:
+            for name in genuine:
                 lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
-        return kept, self._unnamed(lots, kept, drivers, needed)
+        return genuine, self._unnamed(lots, genuine, drivers, needed)
 
     def _unnamed(
         self, lots: Sequence[ScoredLot], names: Sequence[Name], drivers: Sequence[str], needed: float
@@ -141,7 +144,7 @@ class Pool:
             scores = {driver: self.scores(driver, of)[SHAPE] for driver, of in sums.items()}
             left = [driver for driver in scores if again[driver][SHAPE] > np.sqrt(2.0 * needed)]
             best = max(left, key=lambda driver: scores[driver], default=None)
-            if best is None or scores[best] <= least or best in {one.driver for one in out}:
+            if best is None or scores[best] <= least or best in {unnamed.driver for unnamed in out}:
                 break
             out.append(self._shape(best, sums[best], scores[best]))
             least = max(least, _REMAINDER * scores[best])
@@ -163,10 +166,10 @@ class Pool:
         root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
         scale = over(np.ones_like(root), root)
         sizes = scale * (over(centred[:, here], root) @ inner)
-        whole = (scale[:, :, None] * inner * scale[:, None, :]).reshape(
+        covariance = (scale[:, :, None] * inner * scale[:, None, :]).reshape(
             len(root), self.axes, -1, self.axes, here.size // self.axes
         )
-        covariances = np.stack([whole[:, axis, :, axis] for axis in range(self.axes)])
+        covariances = np.stack([covariance[:, axis, :, axis] for axis in range(self.axes)])
         return np.moveaxis(sizes.reshape(len(root), self.axes, -1), 1, 0), covariances
 
     def _in_order(
@@ -178,7 +181,7 @@ class Pool:
         """Pairs of score, driver and effect as names, the best first."""
         for top, best, effect in sorted(pairs, reverse=True):
             # what differs by a level is not zero on average either: the driver says more
-            same = (n for score, n, one in pairs if one == effect and n != MEAN and score > top - CLASS_WIDTH)
+            same = (n for score, n, other in pairs if other == effect and n != MEAN and score > top - CLASS_WIDTH)
             driver = next(same, best)
             yield self._name(driver, sums[driver], effect, scores)
 
@@ -233,8 +236,8 @@ class Pool:
 
     def carried(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Array:
         """Contribution (n,) of each lot to the evidence of an effect by a driver."""
-        place = self.effects.index(effect)
-        return np.array([x[place] for _, x in self._crossed(lots, [driver])])
+        index = self.effects.index(effect)
+        return np.array([x[index] for _, x in self._crossed(lots, [driver])])
 
     def confirmed(
         self, before: Sequence[ScoredLot], after: Sequence[ScoredLot], driver: str, effect: str
@@ -243,13 +246,13 @@ class Pool:
 
         It is one where the effect is confirmed; lots with levels that were not there before show nothing.
         """
-        place, sums = self.effects.index(effect), gathered(before, [driver])
+        index, sums = self.effects.index(effect), gathered(before, [driver])
         if driver not in sums:
             return float("nan"), float("inf"), 0
         shown, expected = np.zeros((2, len(after)))
         for number, lot in enumerate(after):
-            shown[number] = self._of_effects(self._predicted(lot, driver, sums[driver]))[place]
-            expected[number] = self._of_effects(self._expected(lot, driver, sums[driver]))[place]
+            shown[number] = self._of_effects(self._predicted(lot, driver, sums[driver]))[index]
+            expected[number] = self._of_effects(self._expected(lot, driver, sums[driver]))[index]
         able, total = int(np.count_nonzero(expected > 0.0)), float(expected.sum())
         if not able or total <= 0.0:
             return float("nan"), float("inf"), 0
@@ -266,13 +269,13 @@ class Pool:
     @cached_property
     def effects(self) -> list[str]:
         """Ids of the effects, in the order of their columns."""
-        return list(dict.fromkeys(one for one, _ in self.columns))
+        return list(dict.fromkeys(effect for effect, _ in self.columns))
 
     @cached_property
     def _sum_over(self) -> Array:
         """(h, effects): which axes and columns belong to an effect."""
-        one = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
-        return np.tile(one, (self.axes, 1))
+        belongs = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
+        return np.tile(belongs, (self.axes, 1))
 
     def _of_effects(self, x: Array) -> Array:
         return x @ self._sum_over
@@ -294,10 +297,10 @@ class Pool:
         for axis in range(self.axes):
             here, every = axis * count + at, axis * count + np.arange(count)
             of_units = weights @ sizes[axis]  # (units, p)
-            own = np.sqrt(np.maximum(lot.own[:, every], 0.0))
+            unit_roots = np.sqrt(np.maximum(lot.own[:, every], 0.0))
             total = np.maximum(lot.own[:, here].sum(axis=0), 1e-300)
             in_common.append((of_units * lot.own[:, here]).sum(axis=0) / total)
-            score[:, every] -= own * (((of_units - in_common[-1]) * own[:, at]) @ self.inside[axis][at])
+            score[:, every] -= unit_roots * (((of_units - in_common[-1]) * unit_roots[:, at]) @ self.inside[axis][at])
         # errors of the station, which are free, join the axes
         score -= root * ((np.concatenate(in_common) * root[everywhere]) @ self.lot[everywhere]) / units
         return replace(lot, score=score)
@@ -306,18 +309,18 @@ class Pool:
         """A lot whose model has an effect more, with coefficients of every unit and axis: U_j − I_jk U_k / I_kk, on its sums."""
         at, count = self.places(effect), len(self.columns)
         sums, share = lot.score.sum(axis=0), lot.own / lot.total
-        left, own, information = lot.inside[0].copy(), lot.own.copy(), lot.information.copy()
+        left, by_unit, information = lot.inside[0].copy(), lot.own.copy(), lot.information.copy()
         for axis in range(self.axes):
             every = axis * count + np.arange(count)
-            left[:, every], own[:, every] = _beside(left[:, every], own[:, every], self.inside[axis], at)
+            left[:, every], by_unit[:, every] = _beside(left[:, every], by_unit[:, every], self.inside[axis], at)
         of_sums = _beside(sums[None], information[None], self.lot, self._everywhere(effect))
-        sums, information = (one[0] for one in of_sums)
-        score = np.where(own > 0.0, left + share * sums, 0.0)
-        return replace(lot, score=score, own=own, information=information)
+        sums, information = (part[0] for part in of_sums)
+        score = np.where(by_unit > 0.0, left + share * sums, 0.0)
+        return replace(lot, score=score, own=by_unit, information=information)
 
     def places(self, effect: str) -> Places:
         """Columns of an effect, (p,)."""
-        return np.array([k for k, (one, _) in enumerate(self.columns) if one == effect], dtype=np.intp)
+        return np.array([k for k, (name, _) in enumerate(self.columns) if name == effect], dtype=np.intp)
 
     def _everywhere(self, effect: str) -> Places:
         """Hypotheses of an effect, (axes·p,), axis by axis."""
@@ -326,7 +329,7 @@ class Pool:
     def _inner(self, sums: DriverSums, effect: str) -> Array:
         """Inverse of the correlations of an effect's hypotheses, (axes·p, axes·p), for a driver.
 
-        Combinations that errors of the station, or rounding of what is kept, leave nothing of do not count: of a large effect
+        Combinations that errors of the station, or rounding of the stored sums, leave nothing of do not count: of a large effect
         they would explain three times what there is.
         """
         at, here = self.places(effect), self._everywhere(effect)
@@ -360,10 +363,10 @@ class Pool:
     def _name(self, driver: str, sums: DriverSums, effect: str, scores: Mapping[str, Mapping[str, float]]) -> Name:
         count, top = len(self.columns), scores[driver][effect]
         width = max(CLASS_WIDTH, _INEXACT * top)
-        effects = [one for one, score in scores[driver].items() if score > top - width and one != SHAPE]
+        effects = [rival for rival, score in scores[driver].items() if score > top - width and rival != SHAPE]
         drivers = [name for name, of in scores.items() if of[effect] > top - CLASS_WIDTH]
-        effects.sort(key=lambda one: self._rank(one, top - scores[driver][one], top))
-        drivers.sort(key=lambda one: (one != driver, -scores[one][effect]))
+        effects.sort(key=lambda rival: self._rank(rival, top - scores[driver][rival], top))
+        drivers.sort(key=lambda other: (other != driver, -scores[other][effect]))
         here = np.arange(self.axes) * count + self.places(effects[0])[0]
         info = sums.information[:, here]
         sizes = over(about_common(driver, sums)[:, here], info) * self.size[here]
@@ -384,8 +387,8 @@ def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], n
     out: set[int] = set()
     for driver in {name.drivers[0] for name in names}:
         before = [scores.get(driver, 0.0) for scores in of_pose]
-        own = [at for at, name in enumerate(names) if name.drivers[0] == driver]
-        parts = [at for at in own if before[at] - before[at + 1] > _OF_POSE * names[at].score]
+        of_driver = [at for at, name in enumerate(names) if name.drivers[0] == driver]
+        parts = [at for at in of_driver if before[at] - before[at + 1] > _OF_POSE * names[at].score]
         explained = sum(names[at].score for at in parts)
         if parts and before[-1] > max(needed, _REMAINDER * explained):
             out |= set(parts) if before[parts[0]] > explained * (1.0 + _INEXACT) + CLASS_WIDTH else set()

@@ -54,8 +54,8 @@ def two_populations(values: Array, rng: Generator) -> TwoPopulations | None:
     z = rng.permutation((known - centre) / scale)
     halves = z[0::2], z[1::2]
     ways = [
-        float(np.sum(np.logaddexp(*_parts(other, *_fitted(own))))) - _one_peak(other)
-        for own, other in (halves, halves[::-1])
+        float(np.sum(np.logaddexp(*_parts(test, *_fitted(training))))) - _one_peak(test)
+        for training, test in (halves, halves[::-1])
     ]
     log_e = float(special.logsumexp(ways) - np.log(2.0))
     weights, means, widths = _fitted(z)
@@ -87,11 +87,11 @@ def _fitted(z: Array) -> tuple[Array, Array, Array]:
         for _ in range(_STEPS):
             parts = _parts(z, weights, means, widths)
             total = np.logaddexp(*parts)
-            mine = np.exp(parts - total)
-            counts = np.maximum(mine.sum(axis=1), 2.0)
-            weights, means = counts / counts.sum(), mine @ z / counts
+            shares = np.exp(parts - total)
+            counts = np.maximum(shares.sum(axis=1), 2.0)
+            weights, means = counts / counts.sum(), shares @ z / counts
             # a floor that is added would widen both at each step
-            widths = np.maximum(np.sqrt((mine * (z - means[:, None]) ** 2).sum(axis=1) / counts), least)
+            widths = np.maximum(np.sqrt((shares * (z - means[:, None]) ** 2).sum(axis=1) / counts), least)
             now = float(np.sum(total))
             if now - before < 1e-4:
                 break

@@ -44,8 +44,8 @@ class Sums:
         """Add the increments (h,) of a lot."""
         if self.effects is not None:
             # of two signs: times what earlier lots predict
-            own = x * self.s[: x.size] / (self.v[: x.size] + FIRST) if self.two_sided else x
-            wholes = np.bincount(self.effects, own, self.s.size - x.size)
+            signed = x * self.s[: x.size] / (self.v[: x.size] + FIRST) if self.two_sided else x
+            wholes = np.bincount(self.effects, signed, self.s.size - x.size)
             x = np.concatenate([x, np.asarray(wholes, dtype=np.float64)])
         self.s += x
         self.v += x**2
@@ -56,10 +56,10 @@ class Sums:
         rates = _RATES[:, None]
         out = logsumexp(rates * self.s - 0.5 * rates**2 * self.v, axis=0) - np.log(_RATES.size)
         if self.two_sided:
-            own = slice(None) if self.effects is None else slice(self.effects.size)
-            s, grown = self.s[own], 1.0 + _MIXED[:, None] * self.v[own]
+            single = slice(None) if self.effects is None else slice(self.effects.size)
+            s, grown = self.s[single], 1.0 + _MIXED[:, None] * self.v[single]
             each = -0.5 * np.log(grown) + 0.5 * _MIXED[:, None] * s**2 / grown
-            out[own] = logsumexp(each, axis=0) - np.log(_MIXED.size)
+            out[single] = logsumexp(each, axis=0) - np.log(_MIXED.size)
         return out
 
 

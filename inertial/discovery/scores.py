@@ -38,8 +38,8 @@ _RIDGE = 1e-9
 class LotScores:
     """Scores of a lot; coefficients in g per unit of the effect's column.
 
-    columns : (k,) effect and number of its column, of the sensor; station : (q,) the same of the station
-    axes : letters' places of the m axes
+    columns : (k,) effect and number of its column, of the sensor; station : (q,), of the station
+    axes : indices of the letters of the m axes
     score : (units, m, k), errors of the station taken out · own : (units, m, k), information before that
     lot : (m·k, m·k), information of the sums over the units, errors of the station taken out: they join the axes
     inside : (m, k, k), mean information of a unit before that
@@ -95,13 +95,13 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[list[Array
     names: list[tuple[str, int]] = []
     for effect in effects:
         try:
-            own = problem.columns(effect, starting_values([effect], problem.lot.state).get(effect.id, {}))
+            of_effect = problem.columns(effect, starting_values([effect], problem.lot.state).get(effect.id, {}))
         except MissingInput:
             continue
-        own = own[..., : effect.primary]
-        if own.shape[-1] and np.isfinite(own).all():
-            made.append(own)
-            names += [(effect.id, column) for column in range(own.shape[-1])]
+        of_effect = of_effect[..., : effect.primary]
+        if of_effect.shape[-1] and np.isfinite(of_effect).all():
+            made.append(of_effect)
+            names += [(effect.id, column) for column in range(of_effect.shape[-1])]
     return made, names
 
 
@@ -116,22 +116,22 @@ def _scored(
     k, m, every = len(names), problem.per_unit, slice(0, problem.blocks)
     units = problem.blocks // m
     rows, at = np.empty((problem.blocks, k + len(station), problem.n)), 0
-    for own in columns:
-        rows[:, at : at + own.shape[-1]] = np.swapaxes(own, -1, -2)
-        at += own.shape[-1]
+    for part in columns:
+        rows[:, at : at + part.shape[-1]] = np.swapaxes(part, -1, -2)
+        at += part.shape[-1]
     # every dwell with the same weight: what wander takes from the information of a column, it does not take from the output
     plain = covariance.white_rows(rows[:, :k].copy(), even.noise.shares, every)
     squares = np.einsum("bkn,bkn->bk", plain, plain) - np.sum((plain @ even.q) ** 2, axis=-1)
     plain = squares / (covariance.level * even.noise.scale)[:, None] ** 2
     rows = covariance.white_rows(rows, space.noise.shares, every)
     rows /= (covariance.level * space.noise.scale)[:, None, None]
-    whole, score = np.einsum("bkn,bkn->bk", rows, rows), (rows @ space.targets[..., :1])[..., 0]
+    squares_before, score = np.einsum("bkn,bkn->bk", rows, rows), (rows @ space.targets[..., :1])[..., 0]
     rows -= (rows @ space.q) @ np.swapaxes(space.q, -1, -2)
-    visible = np.einsum("bkn,bkn->bk", rows, rows) > SEEN**2 * whole
+    visible = np.einsum("bkn,bkn->bk", rows, rows) > SEEN**2 * squares_before
     rows *= visible[..., None]
     score = score * visible
     of_sensor, of_station = rows[:, :k], rows[:, k:]
-    own = np.einsum("bkn,bkn->bk", of_sensor, of_sensor)
+    information = np.einsum("bkn,bkn->bk", of_sensor, of_sensor)
     cross = of_sensor @ np.swapaxes(of_station, -1, -2)
     station_score = score[:, k:].sum(axis=0)
     between = np.tensordot(of_station, of_station, ((0, 2), (0, 2)))
@@ -149,7 +149,7 @@ def _scored(
         station=station,
         axes=tuple(problem.axes),
         score=free.reshape(units, m, k) * told,
-        own=own.reshape(units, m, k),
+        own=information.reshape(units, m, k),
         lot=less,
         inside=lots / units,
         station_score=station_score,
@@ -163,12 +163,14 @@ def _scored(
 def _tempco(model: Model) -> Array:
     """Temperature coefficient of the bias of each block, (blocks,), g/K; nan where the model has none."""
     problem, space = model.problem, model.space
-    place = next((at.start for term, at in model.places(shared=False) if term.effect.id == TEMPCO), None)
-    if place is None:
+    column = next((at.start for term, at in model.slices(shared=False) if term.effect.id == TEMPCO), None)
+    if column is None:
         return np.full(problem.blocks, np.nan)
     shared = model.shared @ space.shared_sizes if model.shared.shape[-1] else np.zeros_like(problem.y)
     white = space.whiten(np.concatenate([model.local, (problem.y - shared)[..., None]], axis=-1))
-    return np.array([np.linalg.lstsq(own[:, :-1], own[:, -1], rcond=None)[0][place] for own in white])
+    return np.array(
+        [np.linalg.lstsq(white_block[:, :-1], white_block[:, -1], rcond=None)[0][column] for white_block in white]
+    )
 
 
 def _inverse(information: Array) -> Array:

@@ -60,7 +60,7 @@ class Wander:
     def __init__(self, count: int) -> None:
         self.stations: dict[str, Level] = {}
         self.log_likelihood: Array = np.zeros((WALKS.size, count))
-        self.beside: dict[str, Array] = {}  # the same with a driver's prediction in it
+        self.beside: dict[str, Array] = {}  # the likelihood with a driver's prediction in it
         self._scale, self._lots = np.zeros(count), np.zeros(count)
 
     @property
@@ -69,7 +69,7 @@ class Wander:
         return _gained(self.log_likelihood)
 
     def gained_beside(self, name: str) -> Array:
-        """The same with a driver's predictions in the model, (h,): what the driver does not explain."""
+        """Log likelihood that a walk gains with a driver's predictions in the model, (h,): what the driver does not explain."""
         known = self.beside.get(name)
         return np.zeros(self.log_likelihood.shape[1]) if known is None else _gained(known)
 

@@ -88,13 +88,13 @@ def linearity_error(polynomial: Polynomial, full_scale_g: float) -> float:
     """Standard uncertainty of the linearity by the least-squares line, % of the one-sided range.
 
     The deviation is linear in the coefficients, whose errors are correlated: over one set of speeds the terms are nearly of one
-    shape, and errors of one are made up for by the others. At the place of the largest deviation it is √(dᵀCd).
+    shape, and errors of one are made up for by the others. Where the deviation is largest it is √(dᵀCd).
     """
     x = np.linspace(-full_scale_g, full_scale_g, 2001)
     each = _apart(x, columns(x, polynomial.names))
-    place = each[int(np.argmax(np.abs(each @ polynomial.value)))]
+    row = each[int(np.argmax(np.abs(each @ polynomial.value)))]
     gain = abs(polynomial.of("scale")[0])
-    return float(100.0 * np.sqrt(place @ polynomial.covariance @ place) / (gain * full_scale_g))
+    return float(100.0 * np.sqrt(row @ polynomial.covariance @ row) / (gain * full_scale_g))
 
 
 def _apart(x: Array, y: Array) -> Array:

@@ -87,7 +87,9 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
 
 def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence[str] = DEFAULT) -> SpinDiagnosis:
     """The verdict on bias, scale and ``effects``, with the classes of effects that make the model adequate."""
-    judged, _ = judge_points(len(output), lambda kept: _judged(points.picked(kept), output[kept], error[kept], effects))
+    judged, _ = judge_points(
+        len(output), lambda sound: _judged(points.picked(sound), output[sound], error[sound], effects)
+    )
     before, after = (float(np.sqrt(np.mean(fit.residuals**2))) for fit in (judged.fit, judged.extended))
     again = tuple(f"measure {points.acceleration[k]:+.4g} g again: it departs alone" for k in judged.alone)
     return SpinDiagnosis(
@@ -97,7 +99,7 @@ def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence
 
 def _judged(points: Spins, output: Array, error: Array, effects: Sequence[str]) -> Judged[SpinFit]:
     """The verdict on a model on all of the points."""
-    seen = [name for name, one in EFFECTS.items() if one.seen(points)]
+    seen = [name for name, effect in EFFECTS.items() if effect.seen(points)]
     names = [name for name in effects if name in seen]
 
     def without_worst(fit: SpinFit) -> tuple[SpinFit, int]:

@@ -37,8 +37,8 @@ def effects_of(package: str, path: Iterable[str], base: type[AnyEffect]) -> dict
         if info.name == "base":
             continue
         content = vars(import_module(f"{package}.{info.name}")).values()
-        own: list[Any] = [c for c in content if isinstance(c, type) and issubclass(c, base) and c is not base]
-        if len(own) != 1 or own[0].id != info.name:
+        defined: list[Any] = [c for c in content if isinstance(c, type) and issubclass(c, base) and c is not base]
+        if len(defined) != 1 or defined[0].id != info.name:
             raise IncompleteEffect(f"{package}.{info.name}: one effect with id '{info.name}' is needed; define it")
-        effects[info.name] = own[0]()
+        effects[info.name] = defined[0]()
     return effects

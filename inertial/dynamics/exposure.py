@@ -58,11 +58,11 @@ def temperature_slope(force: Array, output: Array, temperature: Array, at_C: flo
     """
     if not np.isfinite([at_C, *temperature]).all():
         raise NotIdentified("the unit's temperature is not recorded")
-    own, theta = np.column_stack([np.ones(len(force)), force]), temperature - at_C
+    columns, theta = np.column_stack([np.ones(len(force)), force]), temperature - at_C
     groups = theta < -APART_K, np.abs(theta) <= APART_K, theta > APART_K
-    rows = np.hstack([own * theta[:, None] ** power for power in range(3)])
+    rows = np.hstack([columns * theta[:, None] ** power for power in range(3)])
     dof = len(rows) - rows.shape[1]
-    if dof < FEWEST_LEFT or any(np.linalg.matrix_rank(own[group]) < own.shape[1] for group in groups):
+    if dof < FEWEST_LEFT or any(np.linalg.matrix_rank(columns[group]) < columns.shape[1] for group in groups):
         raise NotIdentified(
             f"six poses are needed at the temperature of the test ({at_C:.3g} °C), and more than {APART_K:g} K below and above it"
         )
@@ -91,8 +91,8 @@ def exposure_shift(
     NotIdentified
         Too few records, or poses that do not tell bias from response.
     """
-    own = np.column_stack([np.ones(len(force)), force])
-    rows = np.hstack([own, own * after[:, None]])
+    columns = np.column_stack([np.ones(len(force)), force])
+    rows = np.hstack([columns, columns * after[:, None]])
     dof = len(rows) - rows.shape[1]
     if dof < FEWEST_LEFT or np.linalg.matrix_rank(rows) < rows.shape[1]:
         raise NotIdentified(

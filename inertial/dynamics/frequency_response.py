@@ -92,12 +92,12 @@ def frequency_response(
     widened = t.isf(norm.sf(2.0), np.maximum(2.0 * made.lines - 4.0, 1.0)) / 2.0
     made = _sharpened(replace(made, error=made.error * widened))
     power = np.array([np.mean(np.abs(from_x[a:b]) ** 2) for a, b in _edges(f, per_octave)])
-    kept = (made.error < LARGEST_ERROR) & (power > EXCITED * power.max())
-    if not kept.any():
+    usable = (made.error < LARGEST_ERROR) & (power > EXCITED * power.max())
+    if not usable.any():
         raise NotIdentified(
             "response: in no band does the output follow the reference; check channels, cable and mounting"
         )
-    made = made.picked(kept)
+    made = made.picked(usable)
     back = np.exp(-2j * np.pi * made.frequency * delay)
     return replace(made, h1=made.h1 * back, h2=made.h2 * back)
 
@@ -113,9 +113,9 @@ def _lines(wave: Array, rate_hz: float, seconds: float, count: int) -> Complex:
 def _delay(x: Complex, y: Complex, seconds: float) -> float:
     """The delay of the output, s, by the largest correlation: a phase that turns within a band would lower its average."""
     cross = np.fft.irfft(np.concatenate([[0.0], np.conj(x) * y]))
-    place = int(np.argmax(np.abs(cross)))
-    place -= cross.size if place > cross.size // 2 else 0
-    return place * seconds / cross.size
+    lag = int(np.argmax(np.abs(cross)))
+    lag -= cross.size if lag > cross.size // 2 else 0
+    return lag * seconds / cross.size
 
 
 def _edges(f: Array, per_octave: int) -> list[tuple[int, int]]:
@@ -137,20 +137,20 @@ def _band(f: Array, x: Complex, y: Complex) -> tuple[float, complex, complex, fl
     With a line a + b·(f − f₀) fitted by least squares weighted with the power of the reference, a is H1 at the mean f₀.
     """
     power = np.abs(x) ** 2
-    whole = float(power.sum())
-    if not whole > 0.0:
+    total = float(power.sum())
+    if not total > 0.0:
         return float(f.mean()), 0j, 0j, 0.0, np.inf, float(f.size)
-    middle = float(power @ f) / whole
+    middle = float(power @ f) / total
     cross, across = complex(np.vdot(x, y)), float(np.sum(np.abs(y) ** 2))
-    h1 = cross / whole
+    h1 = cross / total
     apart = f - middle
     slope = complex(np.sum(np.conj(x) * y * apart)) / float(power @ apart**2)
     left = float(np.sum(np.abs(y - (h1 + slope * apart) * x) ** 2))
     lines = _INDEPENDENT * f.size
     noise = left / max(lines - 2.0, 1.0) * lines / f.size
     size = abs(h1)
-    error = float(np.sqrt(0.5 * noise / whole / _INDEPENDENT) / size) if size > 0.0 else np.inf
-    coherence = abs(cross) ** 2 / (whole * across) if across > 0.0 else 0.0
+    error = float(np.sqrt(0.5 * noise / total / _INDEPENDENT) / size) if size > 0.0 else np.inf
+    coherence = abs(cross) ** 2 / (total * across) if across > 0.0 else 0.0
     return middle, h1, across / np.conj(cross) if cross else 0j, coherence, error, lines
 
 

@@ -87,7 +87,7 @@ class Judged(Generic[AnyFit]):
     """The verdict on a model of a test.
 
     adequate : None where it cannot be judged, with ``reason``
-    fit : of the judged model; extended : with one effect of each class, the same where none is named
+    fit : of the judged model; extended : with one effect of each class, equal to ``fit`` where none is named
     classes : effects that make the model adequate, one class after the other
     alone : points that depart alone, where that is more likely than any effect; ``extended`` and ``classes`` are without them
     left_out : rms weighted residual of left-out points before and after; near 1 for a right model
@@ -109,7 +109,7 @@ class Judged(Generic[AnyFit]):
     @property
     def recommended(self) -> tuple[str, ...]:
         """One effect per class, the best of it."""
-        return tuple(one.effects[0] for one in self.classes)
+        return tuple(effect_class.effects[0] for effect_class in self.classes)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class BadPoint(Generic[AnyFit]):
     """A point that departs alone, as a cause of a misfit.
 
     without : the fit of the same model without the point that departs most, and which that is
-    located : effects that may sit at any point, as a mode does: beside a bad point they pay for their place, too
+    located : effects that may sit at any point, as a mode does: beside a bad point their price includes this choice, too
     """
 
     without: Callable[[AnyFit], tuple[AnyFit, int]]
@@ -126,8 +126,10 @@ class BadPoint(Generic[AnyFit]):
 
 def breakers_of(classes: Sequence[EffectClass], effects: Mapping[str, DynamicEffect]) -> tuple[str, ...]:
     """The measurements that separate the first two members of each class of several effects."""
-    open_classes = [one for one in classes if len(one.effects) > 1]
-    return tuple(dict.fromkeys(effects[name].breaker for one in open_classes for name in one.effects[:2]))
+    open_classes = [effect_class for effect_class in classes if len(effect_class.effects) > 1]
+    return tuple(
+        dict.fromkeys(effects[name].breaker for effect_class in open_classes for name in effect_class.effects[:2])
+    )
 
 
 def judge(
@@ -184,15 +186,15 @@ def judge_points(count: int, verdict_on: Callable[[Flags], Judged[AnyFit]]) -> t
     count : of points
     verdict_on : the verdict on some of them, which names at most one that departs alone
     """
-    kept = np.ones(count, dtype=bool)
-    first = judged = verdict_on(kept)
+    sound = np.ones(count, dtype=bool)
+    first = judged = verdict_on(sound)
     while judged.alone:
-        kept[np.flatnonzero(kept)[list(judged.alone)]] = False
-        if FEWEST_TO_ONE_ALONE * (count - kept.sum()) > count:  # no single points: all are worse than was stated
+        sound[np.flatnonzero(sound)[list(judged.alone)]] = False
+        if FEWEST_TO_ONE_ALONE * (count - sound.sum()) > count:  # no single points: all are worse than was stated
             return replace(first, alone=()), np.ones(count, dtype=bool)
-        judged = verdict_on(kept)
-    alone = tuple(np.flatnonzero(~kept).tolist())
-    return replace(judged, adequate=first.adequate, fit=first.fit, alone=alone), kept
+        judged = verdict_on(sound)
+    alone = tuple(np.flatnonzero(~sound).tolist())
+    return replace(judged, adequate=first.adequate, fit=first.fit, alone=alone), sound
 
 
 def _score(fit: Fitted, price: float) -> float:
@@ -211,15 +213,15 @@ def _bad(
 def _departs_alone(fit: Fitted, rest: Fitted, rival: Fitted, price: float, *, sought: bool) -> bool:
     """Whether a point, the worst of all, departs by more than the scatter of the rest, and more likely than by an effect.
 
-    ``rival``: fit with the best effect. The point is one of many; so is the place of an effect that was ``sought`` among them.
+    ``rival``: fit with the best effect. The point is chosen among many; so is that of an effect which was ``sought`` among them.
     """
     values = fit.dof - rest.dof  # of the point
     if values <= 0:
         return False
     points = fit.dof / values
-    place = 2.0 * float(np.log(points))
+    choice = 2.0 * float(np.log(points))
     gain = (fit.chi_square - rest.chi_square) / max(1.0, rest.chi_square / max(rest.dof, 1))
-    ahead = _score(rest, price) + place < _score(rival, price) + place * sought
+    ahead = _score(rest, price) + choice < _score(rival, price) + choice * sought
     return bool(points * chi2_tail(gain, values) < ADDED_P) and ahead
 
 

@@ -124,6 +124,6 @@ def other_pulses(record: Array, rate_hz: float, duration_s: float) -> tuple[list
             and quiet.size > 0.5 * lasting
             and size[peak] > RISES * quiet.max()
         ):
-            one = OtherPulse(peak / rate_hz, start / rate_hz, float(y[peak]))
-            found[int(start > high)].append(one)
+            pulse = OtherPulse(peak / rate_hz, start / rate_hz, float(y[peak]))
+            found[int(start > high)].append(pulse)
     return found[0][::-1], found[1]

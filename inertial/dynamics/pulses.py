@@ -75,14 +75,14 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
             f"{noise:.3g}; check the trigger"
         )
     low, high = span(y, top, TOP * y[top])
-    places = np.arange(low, high + 1)
-    if places.size < 5:
+    samples = np.arange(low, high + 1)
+    if samples.size < 5:
         raise NotIdentified(
-            f"shock: {places.size} samples in the top tenth of the pulse, 5 or more are needed; sample faster"
+            f"shock: {samples.size} samples in the top tenth of the pulse, 5 or more are needed; sample faster"
         )
-    x = (places - places.mean()) / rate_hz
+    x = (samples - samples.mean()) / rate_hz
     rows = np.column_stack([np.ones_like(x), x, x**2])
-    c = np.linalg.lstsq(rows, y[places], rcond=None)[0]
+    c = np.linalg.lstsq(rows, y[samples], rcond=None)[0]
     at = float(np.clip(-0.5 * c[1] / c[2], x[0], x[-1])) if c[2] < 0.0 else 0.0
     value = float(c[0] + c[1] * at + c[2] * at**2)
     covariance = np.linalg.inv(rows.T @ rows) * noise**2
@@ -189,7 +189,7 @@ def span(y: Array, top: int, level: float) -> tuple[int, int]:
 
 
 def _crossings(y: Array, top: int, level: float) -> tuple[float, float]:
-    """Interpolated places where the pulse crosses a level before and after ``top``, in samples."""
+    """Interpolated times, in samples, at which the pulse crosses a level before and after ``top``."""
     low, high = span(y, top, level)
     start, stop = float(low), float(high)
     if low > 0 and y[low] > y[low - 1]:

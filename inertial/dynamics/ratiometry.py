@@ -66,17 +66,17 @@ def departures(
     """
     ratio = supply / supply[0] if follows else np.ones_like(supply)
     scale = float(abs(sensitivity[0]))
-    own = error / ratio / scale
+    own_error = error / ratio / scale
     gain = sensitivity / ratio / sensitivity[0] - 1.0
     level = (zero / ratio - zero[0]) / scale
-    spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own, own[0]))
-    own_zero = own if zero_error is None else zero_error / ratio / scale
-    zero_spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own_zero, own_zero[0]))
-    slope, slope_error = slope_over(supply, level, own_zero)
-    return Follows(supply, gain, spread, level, zero_spread, slope, slope_error, scale, own, own_zero)
+    spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own_error, own_error[0]))
+    own_zero_error = own_error if zero_error is None else zero_error / ratio / scale
+    zero_spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own_zero_error, own_zero_error[0]))
+    slope, slope_error = slope_over(supply, level, own_zero_error)
+    return Follows(supply, gain, spread, level, zero_spread, slope, slope_error, scale, own_error, own_zero_error)
 
 
-def largest_departure(supply: Array, departure: Array, own: Array) -> tuple[float, float, int]:
+def largest_departure(supply: Array, departure: Array, own_error: Array) -> tuple[float, float, int]:
     """Largest departure over the supplies, its standard uncertainty, unit of the departures, and the number of its supply.
 
     The largest of several departures within the noise is that of the noise: for four of no true departure it is 1.6 standard
@@ -88,11 +88,11 @@ def largest_departure(supply: Array, departure: Array, own: Array) -> tuple[floa
 
     Parameters
     ----------
-    supply, departure : (n,), that of the first supply is 0; own : (n,), standard uncertainties without the first one's share
+    supply, departure : (n,), that of the first supply is 0; own_error : (n,), standard uncertainties without that of the first
     """
     step, enough = supply - supply[0], len(supply) >= FEWEST_OF_PARABOLA
-    line = _curve(supply, departure, own, 1)
-    bent = _curve(supply, departure, own, 2) if enough else line
+    line = _curve(supply, departure, own_error, 1)
+    bent = _curve(supply, departure, own_error, 2) if enough else line
     square_term = bent.square_term() if enough else 0.0
     if chi2_tail(line.square, max(1, len(supply) - 2)) >= ADEQUATE_P and square_term <= 1.0:
         k = int(np.argmax(np.abs(step)))
@@ -101,7 +101,7 @@ def largest_departure(supply: Array, departure: Array, own: Array) -> tuple[floa
         k = int(np.argmax(np.abs(bent.at(step))))
         return float(bent.at(step)[k]), float(bent.error_at(step)[k]), k
     k = int(np.argmax(np.abs(departure)))
-    return float(departure[k]), float(np.hypot(own[k], own[0])), k
+    return float(departure[k]), float(np.hypot(own_error[k], own_error[0])), k
 
 
 @dataclass(frozen=True)
@@ -127,28 +127,28 @@ class _Curve:
         return np.asarray(np.sqrt(np.sum(rows @ self.covariance * rows, axis=1)), dtype=np.float64)
 
 
-def _curve(supply: Array, departure: Array, own: Array, order: int) -> _Curve:
+def _curve(supply: Array, departure: Array, own_error: Array, order: int) -> _Curve:
     """A polynomial through the first supply by weighted least squares; departures share the first's error."""
     rows = (supply - supply[0])[1:, None] ** np.arange(1, order + 1)
-    weighted = np.linalg.solve(np.diag(own[1:] ** 2) + own[0] ** 2, np.column_stack([rows, departure[1:]]))
+    weighted = np.linalg.solve(np.diag(own_error[1:] ** 2) + own_error[0] ** 2, np.column_stack([rows, departure[1:]]))
     covariance = np.linalg.inv(rows.T @ weighted[:, :-1])
     c = covariance @ (rows.T @ weighted[:, -1])
     left = departure[1:] - rows @ c
     return _Curve(c, covariance, float(left @ (weighted[:, -1] - weighted[:, :-1] @ c)))
 
 
-def slope_over(supply: Array, departure: Array, own: Array) -> tuple[float, float]:
+def slope_over(supply: Array, departure: Array, own_error: Array) -> tuple[float, float]:
     """Slope over the supply and its standard uncertainty: of the straight line, or to the supply of the largest departure.
 
     A curve that is symmetric about the first supply has a line without a slope, however far the output departs: the mean slope on
     the way to the largest departure is stated where the output is clearly no line.
     """
-    line = _curve(supply, departure, own, 1)
+    line = _curve(supply, departure, own_error, 1)
     straight = chi2_tail(line.square, max(1, len(supply) - 2)) >= ADEQUATE_P
     if straight and (
-        len(supply) < FEWEST_OF_PARABOLA or _curve(supply, departure, own, 2).square_term() <= CLEAR_SQUARE_TERM
+        len(supply) < FEWEST_OF_PARABOLA or _curve(supply, departure, own_error, 2).square_term() <= CLEAR_SQUARE_TERM
     ):
         return float(line.coefficients[0]), float(np.sqrt(line.covariance[0, 0]))
-    value, error, k = largest_departure(supply, departure, own)
+    value, error, k = largest_departure(supply, departure, own_error)
     step = float(supply[k] - supply[0])
     return value / step, error / abs(step)

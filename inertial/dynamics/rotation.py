@@ -86,8 +86,8 @@ class RotationData:
             known = np.diag(self.white[:, k] ** 2)
             found = wander(self._free, self.output[:, k], known, self._kernel)
             root = np.asarray(np.linalg.cholesky(known + found.variance * self._kernel), dtype=np.float64)
-            free, own = (solve_triangular(root, part, lower=True) for part in (self._free, self.output[:, k]))
-            left = own - free @ np.linalg.lstsq(free, own, rcond=None)[0]
+            free, whitened = (solve_triangular(root, part, lower=True) for part in (self._free, self.output[:, k]))
+            left = whitened - free @ np.linalg.lstsq(free, whitened, rcond=None)[0]
             # how well the noise is known: white noise by many samples, wander by the waves beside the fitted ones
             share = found.variance * float(np.mean(np.diag(self._kernel)))
             part = share / (share + float(np.mean(self.white[:, k] ** 2)))
@@ -98,18 +98,18 @@ class RotationData:
     @cached_property
     def noise_dof(self) -> float:
         """Degrees of freedom of the noise of the axis where it is known least."""
-        return min(one[3] for one in self._noise)
+        return min(noise[3] for noise in self._noise)
 
     @cached_property
     def noise_scale(self) -> tuple[float, float, int]:
         """Variance of whitened outputs by waves beside the fitted ones, the squares there, and the number of free columns."""
         rest = len(self._noise) * (len(self.points.time) - self._free.shape[1])
-        total = sum(one[2] for one in self._noise)
+        total = sum(noise[2] for noise in self._noise)
         return total / rest, total, len(self._noise) * self._free.shape[1]
 
     def white_rows(self, columns: Array) -> Array:
         """Columns (n, axes, m), or outputs (n, axes), with the covariance of the unit matrix: (axes·n, m) or (axes·n,)."""
-        parts = [solve_triangular(one[0], columns[:, k], lower=True) for k, one in enumerate(self._noise)]
+        parts = [solve_triangular(noise[0], columns[:, k], lower=True) for k, noise in enumerate(self._noise)]
         return np.concatenate(parts)
 
     @cached_property
@@ -139,7 +139,7 @@ class RotationModel:
         return names, columns, self.data.white_rows(columns)
 
     def _each_axis(self, name: str, term: Array) -> tuple[list[str], Array]:
-        """Columns (n, axes, axes) of a term (n, axes) with a coefficient of its own on each axis."""
+        """Columns (n, axes, axes) of a term (n, axes) with one coefficient for each axis."""
         letters = self.data.letters
         return [f"{name}_{a}" for a in letters], term[:, :, None] * np.eye(len(letters))
 
@@ -155,9 +155,9 @@ class RotationModel:
             names, columns = self._each_axis("matrix", np.repeat(force[:, [j]], count, axis=1))
             made.append(([f"{name}{axis}" for name in names], columns))
         rate = at.points.rate
-        for name, own in (("delay_outer", at.points.inner_turns == 0), ("delay_inner", at.points.inner_turns > 0)):
-            if np.any(rate[own]):
-                late = (np.where(own, rate, 0.0)[:, None] * slope)[..., None]
+        for name, turning in (("delay_outer", at.points.inner_turns == 0), ("delay_inner", at.points.inner_turns > 0)):
+            if np.any(rate[turning]):
+                late = (np.where(turning, rate, 0.0)[:, None] * slope)[..., None]
                 made.append(([name], self._seen(late)))
         made.append(([f"place_{a}" for a in "xyz"], self._seen(mean(at.radial()))))
         return [n for names, _ in made for n in names], np.concatenate([c for _, c in made], axis=-1)
@@ -178,9 +178,9 @@ class RotationModel:
                 names, columns = [f"{effect}_{k}" for k in range(term.shape[-1])], self._seen(term)
             else:
                 names, columns = self._each_axis(effect, term[:, : len(self.data.letters)])
-            kept = np.linalg.norm(columns, axis=(0, 1)) > 1e-9
-            names = [name for name, keep in zip(names, kept, strict=True) if keep]
-            self._columns[effect] = self._whitened(names, columns[..., kept])
+            seen = np.linalg.norm(columns, axis=(0, 1)) > 1e-9
+            names = [name for name, keep in zip(names, seen, strict=True) if keep]
+            self._columns[effect] = self._whitened(names, columns[..., seen])
         return self._columns[effect]
 
     def _system(self, effects: Sequence[str]) -> tuple[list[str], Array, Array, Array]:
@@ -195,11 +195,11 @@ class RotationModel:
 
     def seen(self, effect: str) -> bool:
         """Whether the points can show an effect beside bias, matrix, delay and place."""
-        own = self._of(effect)[2]
-        if own.shape[1] == 0:
+        columns = self._of(effect)[2]
+        if columns.shape[1] == 0:
             return False
-        left = own - self._base[2] @ np.linalg.lstsq(self._base[2], own, rcond=None)[0]
-        return bool(np.linalg.norm(left) > 1e-6 * np.linalg.norm(own))
+        left = columns - self._base[2] @ np.linalg.lstsq(self._base[2], columns, rcond=None)[0]
+        return bool(np.linalg.norm(left) > 1e-6 * np.linalg.norm(columns))
 
     def fit(self, effects: Sequence[str]) -> RotationFit:
         """Least squares; coefficients that only effects of one column share are those of least norm.
@@ -217,12 +217,12 @@ class RotationModel:
                 "rotation: the turns do not tell bias, scale, misalignment and delay apart; turn another plane too"
             )
         left, singular, right = np.linalg.svd(rows / size, full_matrices=False)
-        kept = singular > 1e-6 * singular[0]
-        value = (right[kept].T @ ((left[:, kept].T @ target) / singular[kept])) / size
-        inverse = (right[kept].T / singular[kept] ** 2) @ right[kept] / np.outer(size, size)
+        determined = singular > 1e-6 * singular[0]
+        value = (right[determined].T @ ((left[:, determined].T @ target) / singular[determined])) / size
+        inverse = (right[determined].T / singular[determined] ** 2) @ right[determined] / np.outer(size, size)
         variance, beside, free = self.data.noise_scale
         squares = float(np.sum((target - rows @ value) ** 2)) - beside
-        dof = free + (len(target) - len(self._target)) - int(kept.sum())
+        dof = free + (len(target) - len(self._target)) - int(determined.sum())
         total = len(self._target) - free
         # the noise is estimated too: its own scatter widens χ², so that both laws agree where a model is refused
         wide = float(f.isf(ADEQUATE_P, dof, total) * dof / chi2.isf(ADEQUATE_P, dof))

@@ -47,8 +47,12 @@ class Rotations:
     def later(self, delay: Array) -> "Rotations":
         """The points where the table is ``delay`` s (outer, inner) after the encoder's readings."""
         ahead = self.rate * np.where(self.inner_turns > 0, delay[1], delay[0])
-        own = self.inner_turns > 0
-        return replace(self, outer=self.outer + np.where(own, 0.0, ahead), inner=self.inner + np.where(own, ahead, 0.0))
+        about_inner = self.inner_turns > 0
+        return replace(
+            self,
+            outer=self.outer + np.where(about_inner, 0.0, ahead),
+            inner=self.inner + np.where(about_inner, ahead, 0.0),
+        )
 
 
 @dataclass(frozen=True)
@@ -75,12 +79,12 @@ class Nodes:
     def of(cls, points: Rotations) -> "Nodes":
         """The nodes of points."""
         step = 0.5 * NODES[:, None] * points.span
-        own = points.inner_turns > 0
-        outer, inner = points.outer + np.where(own, 0.0, step), points.inner + np.where(own, step, 0.0)
+        about_inner = points.inner_turns > 0
+        outer, inner = points.outer + np.where(about_inner, 0.0, step), points.inner + np.where(about_inner, step, 0.0)
         force = to_fixture(UP, outer, inner)
         zero = np.zeros_like(inner)
         about_x = np.stack([np.cos(inner), -np.sin(inner), zero], axis=-1)
-        axis = np.where(own[:, None], np.stack([zero, zero, zero + 1.0], axis=-1), about_x)
+        axis = np.where(about_inner[:, None], np.stack([zero, zero, zero + 1.0], axis=-1), about_x)
         return cls(points, outer, inner, force, axis, np.cross(force, axis))
 
     def radial(self) -> Array:

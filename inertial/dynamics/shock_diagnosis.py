@@ -75,18 +75,18 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags]
     duration = record.duration_s
     parameters = [(name, p) for name in effects for p in EFFECTS[name].parameters(duration)]
     used = [np.ones(len(shock.unit), dtype=bool) for shock in record.shocks] if rows is None else list(rows)
-    count = sum(int(one.sum()) for one in used)
+    count = sum(int(rows.sum()) for rows in used)
     if count < len(effects) + len(parameters) + 2:
         raise NotIdentified(
             f"shock: {count} samples for {len(effects) + len(parameters) + 1} parameters; record faster"
         )
-    whole = np.concatenate(used)
-    target = np.concatenate([one.unit / one.error for one in record.shocks])[whole]
+    counted = np.concatenate(used)
+    target = np.concatenate([shock.unit / shock.error for shock in record.shocks])[counted]
     model = Design(record, effects, parameters)
     coordinates = model.coordinates
 
     def design(x: Array) -> Array:
-        return model.at(x)[whole]
+        return model.at(x)[counted]
 
     def solved(x: Array) -> tuple[Array, Array]:
         columns = design(x)
@@ -124,7 +124,7 @@ class Design:
     ) -> None:
         self.record, self.effects = record, tuple(effects)
         self.coordinates = Coordinates([p for _, p in parameters])
-        self._own = [np.array([of == name for of, _ in parameters], dtype=bool) for name in self.effects]
+        self._parameters_of = [np.array([of == name for of, _ in parameters], dtype=bool) for name in self.effects]
         extra = [
             [EFFECTS[name].added(shock.reference, record.rate_hz) for name in self.effects] for shock in record.shocks
         ]
@@ -136,19 +136,19 @@ class Design:
         values, parts = self.coordinates.values(x), list[Array]()
         if len(self._waves) > _KEPT:
             self._waves.clear()
-        for place, (one, added) in enumerate(zip(self.record.shocks, self._added, strict=True)):
-            wave = self._passed(place, one.reference, values)
-            parts.append(np.column_stack([wave, *added]) / one.error[:, None])
+        for number, (shock, added) in enumerate(zip(self.record.shocks, self._added, strict=True)):
+            wave = self._passed(number, shock.reference, values)
+            parts.append(np.column_stack([wave, *added]) / shock.error[:, None])
         return np.vstack(parts)
 
-    def _passed(self, place: int, wave: Array, values: Array) -> Array:
+    def _passed(self, number: int, wave: Array, values: Array) -> Array:
         """The waveform of a shock's reference after all effects."""
-        key: tuple[object, ...] = (place,)
-        for name, own in zip(self.effects, self._own, strict=True):
-            mine = values[own]
-            key = (*key, name, *mine.tolist())
+        key: tuple[object, ...] = (number,)
+        for name, chosen in zip(self.effects, self._parameters_of, strict=True):
+            of_effect = values[chosen]
+            key = (*key, name, *of_effect.tolist())
             if key not in self._waves:
-                self._waves[key] = EFFECTS[name].changed(wave, self.record.rate_hz, mine)
+                self._waves[key] = EFFECTS[name].changed(wave, self.record.rate_hz, of_effect)
             wave = self._waves[key]
         return wave
 
@@ -175,7 +175,7 @@ def _search(parameters: Sequence[Parameter], coordinates: Coordinates, residual:
     done = [
         least_squares(residual, x, bounds=(low, high), x_scale=scale, max_nfev=60, xtol=1e-9, ftol=1e-9) for x in best
     ]
-    return np.asarray(min(done, key=lambda one: one.cost).x)
+    return np.asarray(min(done, key=lambda fit: fit.cost).x)
 
 
 def _errors(design: Callable[[Array], Array], x: Array, c: Array) -> Array:
@@ -194,7 +194,8 @@ def _errors(design: Callable[[Array], Array], x: Array, c: Array) -> Array:
 def residual_percent(record: ShockRecord, left: Sequence[Array]) -> float:
     """Rms residual of the shocks, in % of the peak of each."""
     squares = [
-        np.mean(one**2) / np.max(np.abs(shock.unit)) ** 2 for one, shock in zip(left, record.shocks, strict=True)
+        np.mean(residual**2) / np.max(np.abs(shock.unit)) ** 2
+        for residual, shock in zip(left, record.shocks, strict=True)
     ]
     return float(100.0 * np.sqrt(np.mean(squares)))
 
@@ -235,9 +236,9 @@ def diagnose_shock(record: ShockRecord, effects: Sequence[str] = DEFAULT) -> Sho
 
 def _where(record: ShockRecord, fit: ShockFit) -> tuple[str, float]:
     total = np.zeros(3)
-    for one, left in zip(record.shocks, fit.residuals, strict=True):
+    for shock, left in zip(record.shocks, fit.residuals, strict=True):
         time = np.arange(len(left)) / record.rate_hz
-        square = (left / one.error) ** 2
+        square = (left / shock.error) ** 2
         end = record.before_s + record.duration_s
         total += [
             square[time < record.before_s].sum(),
@@ -253,8 +254,8 @@ def _left_out(record: ShockRecord, effects: Sequence[str]) -> float:
     total, count = 0.0, 0
     for fold in range(FOLDS):
         out = [np.arange(len(shock.unit)) % FOLDS == fold for shock in record.shocks]
-        fit = fit_shock(record, effects, [~one for one in out])
-        for one, left, rows in zip(record.shocks, fit.residuals, out, strict=True):
-            total += float(np.sum((left[rows] / one.error[rows]) ** 2))
+        fit = fit_shock(record, effects, [~rows for rows in out])
+        for shock, left, rows in zip(record.shocks, fit.residuals, out, strict=True):
+            total += float(np.sum((left[rows] / shock.error[rows]) ** 2))
             count += int(rows.sum())
     return float(np.sqrt(total / count))

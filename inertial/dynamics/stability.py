@@ -168,9 +168,9 @@ def short_noise(record: Array, rate_hz: float, *, trend: int = 0) -> ShortNoise:
     fast, slow = (float(np.mean(np.diff(block_means(record, k)) ** 2) / 2.0) for k in (1, min(4, size)))
     step = min(4, size)
     white = max(0.0, (fast - slow) / (1.0 - 1.0 / step)) if step > 1 else 0.0  # of a sample
-    place = np.linspace(-1.0, 1.0, means.size)
+    position = np.linspace(-1.0, 1.0, means.size)
     known = white / size * np.eye(means.size) + 1e-12 * float(np.var(means)) * np.eye(means.size)
-    flicker = wander(np.vander(place, trend + 1), means, known, kernels_of(means.size)[0])
+    flicker = wander(np.vander(position, trend + 1), means, known, kernels_of(means.size)[0])
     octave = 2.0 * np.log(2.0)
     return ShortNoise(white / rate_hz, octave * flicker.variance, octave * flicker.error)
 

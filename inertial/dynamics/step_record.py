@@ -112,25 +112,25 @@ def aligned(times: Sequence[Array], responses: Sequence[Array]) -> list[Array]:
     responses : share of the step
     """
     step = float(np.median(np.diff(times[0])))
-    own = [time.copy() for time in times]
+    shifted = [time.copy() for time in times]
     for _ in range(ALIGNMENTS):
-        place = [np.round(time / step).astype(int) for time in own]
-        first = min(int(one.min()) for one in place)
-        joined = np.concatenate(place) - first
+        steps = [np.round(time / step).astype(int) for time in shifted]
+        first = min(int(indices.min()) for indices in steps)
+        joined = np.concatenate(steps) - first
         count = np.maximum(np.bincount(joined), 1)
         mean = np.bincount(joined, weights=np.concatenate(responses)) / count
-        grid = np.bincount(joined, weights=np.concatenate(own)) / count
+        grid = np.bincount(joined, weights=np.concatenate(shifted)) / count
         there = np.bincount(joined) > 0
         grid, mean = grid[there], mean[there]
         slope = np.gradient(mean, grid)
         shift: list[float] = []
-        for time, response in zip(own, responses, strict=True):
+        for time, response in zip(shifted, responses, strict=True):
             at = np.interp(time, grid, slope)
             off = response - np.interp(time, grid, mean)
             shift.append(float(np.sum(at * off) / np.sum(at**2)))
         middle = float(np.mean(shift))
-        own = [time + one - middle for time, one in zip(own, shift, strict=True)]
-    return own
+        shifted = [time + offset - middle for time, offset in zip(shifted, shift, strict=True)]
+    return shifted
 
 
 def _smoothed(time: Array, response: Array, error: Array, width: float) -> tuple[Array, float]:
@@ -229,9 +229,9 @@ def _maximum(time: Array, response: Array, error: Array, after: float, rise: flo
     design = np.vander((time[rows] - near) / width, 5) / error[rows, None]
     covariance = np.linalg.inv(design.T @ design)
     c = covariance @ (design.T @ (response[rows] / error[rows]))
-    places = np.linspace(-0.8, 0.8, 161)
-    curve = np.vander(places, 5)
+    fine = np.linspace(-0.8, 0.8, 161)
+    curve = np.vander(fine, 5)
     k = int(np.argmax(curve @ c))
-    bend = float(np.polyval(np.polyder(c, 2), places[k]))
+    bend = float(np.polyval(np.polyder(c, 2), fine[k]))
     value = float(curve[k] @ c) - 0.5 * bend * blur / width**2
     return value, float(np.sqrt(curve[k] @ covariance @ curve[k]))

@@ -65,8 +65,8 @@ class TiltFit:
         K2·sin² departs by −½·K2·cos 2θ and K3·sin³ by −¼·K3·sin 3θ from a constant and a sine. At θ = 90° and 270° both are
         largest, once with equal and once with opposite signs: ½·|K2| + ¼·|K3|, magnitudes without the share of their noise.
         """
-        place = [self.names.index(name) for name in TERMS[3:]]
-        value, covariance = self.value[place], self.covariance[np.ix_(place, place)]
+        terms = [self.names.index(name) for name in TERMS[3:]]
+        value, covariance = self.value[terms], self.covariance[np.ix_(terms, terms)]
         error = np.sqrt(np.diag(covariance))
         share = np.array([0.5, 0.25])
         sizes = np.array([magnitude(float(v), float(e)) for v, e in zip(value, error, strict=True)])
@@ -81,7 +81,7 @@ class TiltFit:
         other : fit of the other axis at the same angles
         angle_error : standard uncertainty of each angle, rad
         """
-        shares = [one.phase_slope() * one.scale[0] * np.cos(one.angle + one.phase[0]) for one in (self, other)]
+        shares = [fit.phase_slope() * fit.scale[0] * np.cos(fit.angle + fit.phase[0]) for fit in (self, other)]
         return float(angle_error**2 * (shares[0] @ shares[1]))
 
     def phase_slope(self) -> Array:
@@ -125,17 +125,17 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time
         raise NotIdentified(
             f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
         )
-    whole = np.diag(error**2)
+    noise_covariance = np.diag(error**2)
     if time is not None:
         kernel = flicker_kernel(time)
-        whole = whole + wander(rows, output, whole, kernel).variance * kernel
-    root = np.linalg.cholesky(whole)
+        noise_covariance = noise_covariance + wander(rows, output, noise_covariance, kernel).variance * kernel
+    root = np.linalg.cholesky(noise_covariance)
     white_rows, white_output = np.linalg.solve(root, rows), np.linalg.solve(root, output)
     c = np.linalg.lstsq(white_rows, white_output, rcond=None)[0]
     covariance = np.asarray(np.linalg.inv(white_rows.T @ white_rows), dtype=np.float64)
     weights = np.asarray(np.linalg.solve(root.T, white_rows @ covariance).T, dtype=np.float64)
     left = np.eye(len(angle)) - rows @ weights
-    spread = np.sqrt(np.einsum("ij,jk,ik->i", left, whole, left))
+    spread = np.sqrt(np.einsum("ij,jk,ik->i", left, noise_covariance, left))
     return TiltFit(names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle, weights, spread)
 
 

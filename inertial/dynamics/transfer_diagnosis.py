@@ -74,16 +74,16 @@ class TransferDiagnosis(Judged[TransferFit]):
         """A parameter of the extended model, as far as every model that the points do not exclude agrees."""
         value, error, low, high = self.extended.of(name)
         known, rival = self.extended.identified(name), None
-        for one in self.rivals:
-            if not one.has(name):
+        for rival_fit in self.rivals:
+            if not rival_fit.has(name):
                 continue
-            _, _, low_here, high_here = one.of(name)
+            _, _, low_here, high_here = rival_fit.of(name)
             if low_here < low or high_here > high:
                 low, high = min(low, low_here), max(high, high_here)
-                rival = one
+                rival = rival_fit
         reach = max(high - value, value - low) / 1.96
         # beyond the points a frequency, and what else its effect has, is an extrapolation by the form of the model
-        known = known and all(self._reached(one) for one in self.extended.frequencies_of(name))
+        known = known and all(self._reached(frequency) for frequency in self.extended.frequencies_of(name))
         if rival is not None and self.extended.logarithmic(name):
             known = known and reach < IDENTIFIED_SHARE * value
         return StatedParameter(value, max(error, reach), low, high, known, rival)
@@ -103,8 +103,8 @@ def diagnose_transfer(
     effects : of the model to judge
     highest_hz : to which the exciter reaches, for the next frequencies; the points' highest where None
     """
-    judged, kept = judge_points(len(points.value), lambda kept: _judged(points.picked(kept), effects))
-    rest, alone = points.picked(kept), tuple(sorted(points.conditions.frequency[~kept].tolist()))
+    judged, sound = judge_points(len(points.value), lambda sound: _judged(points.picked(sound), effects))
+    rest, alone = points.picked(sound), tuple(sorted(points.conditions.frequency[~sound].tolist()))
     top = float(points.conditions.frequency.max())
     open_end = judged.adequate is None or judged.unexplained
     rivals = () if open_end else _rivals(rest, judged.extended, judged.classes)
@@ -135,12 +135,14 @@ def _judged(points: Points, effects: Sequence[str]) -> Judged[TransferFit]:
             points.picked(np.arange(n) != worst), fit.effects, fit.known, only_near=True, steps=A_FEW
         ), worst
 
-    located = [name for name, one in EFFECTS.items() if any(p.unit == "Hz" for p in one.parameters(points.conditions))]
+    located = [
+        name for name, effect in EFFECTS.items() if any(p.unit == "Hz" for p in effect.parameters(points.conditions))
+    ]
     base = best_of_exchange(points, fit_transfer(points, effects))[0]
     return judge(
         base,
         effects,
-        [name for name, one in EFFECTS.items() if one.seen(points.conditions)],
+        [name for name, effect in EFFECTS.items() if effect.seen(points.conditions)],
         extended_fit,
         lambda fit: _left_out(points, fit),
         remedy="sweep more frequencies",
@@ -150,22 +152,22 @@ def _judged(points: Points, effects: Sequence[str]) -> Judged[TransferFit]:
 
 
 def _rivals(points: Points, extended: TransferFit, classes: Sequence[EffectClass]) -> tuple[TransferFit, ...]:
-    """Models that the points do not exclude in place of the extended one.
+    """Models other than the extended one that the points do not exclude.
 
     A model that describes the points is not the only one: up to 1 kHz a sprung mass of 2.5 kHz with a low-pass of 1.6 kHz looks
     like one of 1.5 kHz with a delay.
     """
-    chosen = [one.effects[0] for one in classes]
+    chosen = [effect_class.effects[0] for effect_class in classes]
     models = [
-        [other if name == one.effects[0] else name for name in extended.effects]
-        for one in classes
-        for other in one.effects[1:]
+        [other if name == effect_class.effects[0] else name for name in extended.effects]
+        for effect_class in classes
+        for other in effect_class.effects[1:]
         if other not in chosen
     ]
     models += [
         [*extended.effects, name]
-        for name, one in EFFECTS.items()
-        if one.in_every_device
+        for name, effect in EFFECTS.items()
+        if effect.in_every_device
         and name not in extended.effects
         and 2 * len(points.value) > 3 * len(extended.parameters) + 8
     ]
@@ -216,13 +218,15 @@ def _where(points: Points, fit: TransferFit) -> tuple[Failure, ...]:
     n = len(points.value)
     order = np.argsort(points.conditions.frequency)
     squares = {"magnitude": fit.residual[:n] ** 2, "phase": fit.residual[n:] ** 2}
-    total = float(sum(one.sum() for one in squares.values()))
+    total = float(sum(of_part.sum() for of_part in squares.values()))
     failures: list[Failure] = []
-    for part, one in squares.items():
+    for part, squares_of_part in squares.items():
         for rows in np.array_split(order, 3):
             f = points.conditions.frequency[rows]
-            failures.append(Failure(float(f.min()), float(f.max()), part, float(one[rows].sum()) / total))
-    return tuple(sorted((failure for failure in failures if failure.share > 1.0 / 6.0), key=lambda one: -one.share))
+            failures.append(Failure(float(f.min()), float(f.max()), part, float(squares_of_part[rows].sum()) / total))
+    return tuple(
+        sorted((failure for failure in failures if failure.share > 1.0 / 6.0), key=lambda failure: -failure.share)
+    )
 
 
 def _left_out(points: Points, fit: TransferFit) -> float:
@@ -234,10 +238,10 @@ def _left_out(points: Points, fit: TransferFit) -> float:
     n = len(points.value)
     if 2 * n * (FOLDS - 1) // FOLDS < 3 * len(fit.effects) + 4 or n < 2 * FOLDS:
         return float("nan")
-    place = np.argsort(np.argsort(points.conditions.frequency))
+    rank = np.argsort(np.argsort(points.conditions.frequency))
     deviance = 0.0
     for fold in range(FOLDS):
-        out = place % FOLDS == fold
+        out = rank % FOLDS == fold
         seen, unseen = points.picked(~out), points.picked(out)
         if not all(EFFECTS[name].seen(seen.conditions) for name in fit.effects):
             continue
@@ -245,10 +249,10 @@ def _left_out(points: Points, fit: TransferFit) -> float:
             unseen.conditions
         )
         ratio = unseen.value / predicted
-        for off, error, own in zip(
+        for off, error, vagueness in zip(
             (np.log(np.abs(ratio)), np.angle(ratio)), (unseen.magnitude_error, unseen.phase_error), vague, strict=True
         ):
-            wider = 1.0 + (own / error) ** 2
+            wider = 1.0 + (vagueness / error) ** 2
             deviance += float(np.sum((off / error) ** 2 / wider + np.log(wider)))
     return float(np.sqrt(deviance / (2 * n)))
 
@@ -261,7 +265,7 @@ def _next_frequencies(
     low, top = float(c.frequency.min()), float(c.frequency.max())
     grid = np.geomspace(low, max(highest, top), 200)
     plan = c.along(grid)
-    models = [one for one in (extended, *rivals) if all(EFFECTS[name].parameters(plan) for name in one.effects)]
+    models = [fit for fit in (extended, *rivals) if all(EFFECTS[name].parameters(plan) for name in fit.effects)]
     values = np.stack([np.log(np.maximum(np.abs(model.response(plan)), 1e-300)) for model in models])
     spread = np.ptp(values, axis=0)
     error = float(np.median(points.magnitude_error))

@@ -126,10 +126,10 @@ class TransferFit:
         """The frequencies among the parameters of the effect to which a parameter belongs."""
         at = 0
         for effect in self.effects:
-            own = self.parameters[at : at + len(EFFECTS[effect].parameters(PLAIN))]
-            if any(p.name == name for p in own):
-                return tuple(p.name for p in own if p.unit == "Hz")
-            at += len(own)
+            parameters = self.parameters[at : at + len(EFFECTS[effect].parameters(PLAIN))]
+            if any(p.name == name for p in parameters):
+                return tuple(p.name for p in parameters if p.unit == "Hz")
+            at += len(parameters)
         return ()
 
     def has(self, name: str) -> bool:
@@ -235,13 +235,13 @@ def fit_transfer(
     screened += sorted(starts(alone=True), key=lambda x: _after_a_step(residual, x))[:SCREENED] if near else []
     tried = sorted(
         (least_squares(residual, x, bounds=bounds, max_nfev=A_FEW, x_scale="jac") for x in screened),
-        key=lambda one: one.cost,
+        key=lambda fit: fit.cost,
     )
     done = [
-        least_squares(residual, one.x, bounds=bounds, max_nfev=steps, x_scale="jac", xtol=1e-8, ftol=1e-8)
-        for one in tried[:POLISHED]
+        least_squares(residual, start.x, bounds=bounds, max_nfev=steps, x_scale="jac", xtol=1e-8, ftol=1e-8)
+        for start in tried[:POLISHED]
     ]
-    best = min(done, key=lambda one: one.cost)
+    best = min(done, key=lambda fit: fit.cost)
     jacobian = np.where(free, best.jac, 0.0)
     covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-15))
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -268,7 +268,7 @@ def _after_a_step(residual: Callable[[Array], Array], start: Array) -> float:
 
 
 def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:
-    """The solution in which sprung mass and two-pole low-pass change places; None where the model has not both.
+    """The solution with sprung mass and two-pole low-pass exchanged; None where the model has not both.
 
     At ζ near 0.7071 both are alike, and a sweep hardly tells which of them is the mass.
     """
@@ -284,7 +284,7 @@ def best_of_exchange(points: Points, fit: TransferFit) -> tuple[TransferFit, Tra
     other = exchanged(points, fit)
     if other is None or abs(np.log(other.of("natural_hz")[0] / fit.of("natural_hz")[0])) < 0.02:
         return fit, None
-    first, second = sorted((fit, other), key=lambda one: one.chi_square)
+    first, second = sorted((fit, other), key=lambda solution: solution.chi_square)
     return first, second if second.chi_square - first.chi_square < 9.0 else None
 
 

@@ -56,8 +56,8 @@ class Sweep:
 
     def uncertain(self, time: Array) -> Array:
         """Independent errors (n, 6) of the angle, rad of one standard deviation: of phase, rate and the low orders together."""
-        kept = 2 + 2 * len(LOW_ORDERS)
-        root = np.linalg.cholesky(self.covariance[:kept, :kept])
+        count = 2 + 2 * len(LOW_ORDERS)
+        root = np.linalg.cholesky(self.covariance[:count, :count])
         return _rows(time - self.middle, self.value[:2], LOW_ORDERS) @ root
 
 

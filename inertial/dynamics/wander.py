@@ -47,8 +47,8 @@ def wander(rows: Array, output: Array, known: Array, kernel: Array) -> Wander:
         return Wander(0.0, 0.0)
 
     def cost(log: float) -> float:
-        whole = known + np.exp(log) * kernel
-        root = np.linalg.cholesky(whole)
+        covariance = known + np.exp(log) * kernel
+        root = np.linalg.cholesky(covariance)
         x, y = np.linalg.solve(root, rows), np.linalg.solve(root, output)
         normal = x.T @ x
         rest = y - x @ np.linalg.solve(normal, x.T @ y)
@@ -58,8 +58,8 @@ def wander(rows: Array, output: Array, known: Array, kernel: Array) -> Wander:
     variance = float(np.exp(minimum.x))
     inverse = np.linalg.inv(known + variance * kernel)
     free = inverse - inverse @ rows @ np.linalg.solve(rows.T @ inverse @ rows, rows.T @ inverse)
-    own = free @ kernel
-    return Wander(variance, float(np.sqrt(2.0 / np.sum(own * own.T))))
+    product = free @ kernel
+    return Wander(variance, float(np.sqrt(2.0 / np.sum(product * product.T))))
 
 
 def logarithmic_kernel(count: int) -> Array:
@@ -166,9 +166,9 @@ class Remainders:
         """Of terms (n, terms), and kernels (n, n)."""
         free = null_space(rows.T)
         kernels = [free.T @ kernel @ free for kernel in (flicker, walk)]
-        one, other = (float(np.trace(kernel)) / free.shape[1] for kernel in kernels)
-        mixed = ((1.0 - share) / one * kernels[0] + share / other * kernels[1] for share in WALK_SHARES)
-        return cls(free, (one, other), [(values, axes) for values, axes in map(np.linalg.eigh, mixed)])
+        flicker_size, walk_size = (float(np.trace(kernel)) / free.shape[1] for kernel in kernels)
+        mixed = ((1.0 - share) / flicker_size * kernels[0] + share / walk_size * kernels[1] for share in WALK_SHARES)
+        return cls(free, (flicker_size, walk_size), [(values, axes) for values, axes in map(np.linalg.eigh, mixed)])
 
 
 def wander_posterior(
@@ -186,18 +186,20 @@ def wander_posterior(
     white : known variance of each value, square of the output's unit
     known : strengths of 1/f noise and walk by another record
     """
-    own, sizes = remainders.free.T @ output, remainders.sizes
-    if not float(own @ own) > 0.0:
+    contrasts, sizes = remainders.free.T @ output, remainders.sizes
+    if not float(contrasts @ contrasts) > 0.0:
         return Posterior(np.zeros(1), np.zeros(1), np.ones(1))
-    variance = np.geomspace(1e-5, 1e4, GRID) * float(np.mean(own**2))
+    variance = np.geomspace(1e-5, 1e4, GRID) * float(np.mean(contrasts**2))
     logs = np.empty((WALK_SHARES.size, GRID))
     for k, (part, turn) in enumerate(remainders.shares):
-        whole = white + variance[:, None] * part
-        prior = np.log(variance) + 0.5 * np.log(np.sum((part / whole) ** 2, axis=1))  # over ln of the variance
-        logs[k] = prior - 0.5 * np.sum(np.log(whole) + (turn.T @ own) ** 2 / whole, axis=1)
+        total = white + variance[:, None] * part
+        prior = np.log(variance) + 0.5 * np.log(np.sum((part / total) ** 2, axis=1))  # over ln of the variance
+        logs[k] = prior - 0.5 * np.sum(np.log(total) + (turn.T @ contrasts) ** 2 / total, axis=1)
     shares = WALK_SHARES[:, None] * variance
     sides = ((variance - shares) / sizes[0]).ravel(), (shares / sizes[1]).ravel()
-    log = logs.ravel() + sum(one.log_likelihood(np.sqrt(side)) for one, side in zip(known, sides, strict=False))
+    log = logs.ravel() + sum(
+        strength.log_likelihood(np.sqrt(side)) for strength, side in zip(known, sides, strict=False)
+    )
     weight = np.exp(log - log.max())
     return Posterior(*sides, np.asarray(weight / weight.sum(), dtype=np.float64))
 
@@ -267,13 +269,13 @@ def _moments_of_allan(count: int) -> tuple[Array, Array]:
         return (sums[2 * parts :] - 2.0 * sums[parts:-parts] + sums[: -2 * parts]) / parts
 
     each = (float(parts) * np.eye(parts * count), flicker, walk / parts)
-    return _moments([differences(differences(one).T) for one in each])
+    return _moments([differences(differences(rows).T) for rows in each])
 
 
 def _moments(parts: list[Array]) -> tuple[Array, Array]:
     """Traces (3,) and traces of products (3, 3) of CV for white noise, 1/f noise and walk of unit strength."""
     traces = np.array([np.trace(part) for part in parts])
-    return traces, np.array([[np.sum(one * other.T) for other in parts] for one in parts])
+    return traces, np.array([[np.sum(part * other.T) for other in parts] for part in parts])
 
 
 def _dof(mixtures: Posterior, white: float, traces: Array, products: Array) -> float:

@@ -62,7 +62,7 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
     for _ in range(2):
         # noise has left the band late: it crosses before
         tries = ((start, reach) for reach in reaches for start in starts)
-        crossing = next((one for start, reach in tries if (one := _crossing(time, away, band, start, reach))), None)
+        crossing = next((found for start, reach in tries if (found := _crossing(time, away, band, start, reach))), None)
         if crossing is None:
             break
         at, slope, weights, of_slope = crossing

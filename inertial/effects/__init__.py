@@ -68,8 +68,8 @@ def _collect(module: ModuleType, effects: dict[str, AnyEffect]) -> list[str]:
     """Instances of the effect classes that a module defines, added to ``effects`` by id."""
     added: list[str] = []
     for item in vars(module).values():
-        own = isinstance(item, type) and issubclass(item, Effect) and item.__module__ == module.__name__
-        if own and hasattr(item, "id"):
+        defined_here = isinstance(item, type) and issubclass(item, Effect) and item.__module__ == module.__name__
+        if defined_here and hasattr(item, "id"):
             if item.id in effects:
                 raise BrokenEffect(f"{module.__name__}: effect id '{item.id}' is taken already; choose another id")
             effects[item.id] = item()  # type: ignore[assignment]  # an Effect with an id is one of its two kinds

@@ -216,6 +216,6 @@ def stack(state: State, columns: Sequence[Array]) -> Array:
         single = columns[0]
         return (single if single.shape == shape else np.broadcast_to(single, shape))[..., None]
     stacked = np.empty((*shape, len(columns)))
-    for place, column in enumerate(columns):
-        stacked[..., place] = column
+    for index, column in enumerate(columns):
+        stacked[..., index] = column
     return stacked

@@ -62,7 +62,7 @@ def _on_arrival(state: State, axis: int, tau: float, since: Array) -> Array:
     outer, inner = _once(state.outer), _once(state.inner)
     alike = len(outer) == len(inner) == 1
     key = (CreepAfterMove.id, "changes on the way")
-    # the same for every τ and axis, and small where all units are on one table
+    # one array for every τ and axis, and small where all units are on one table
     changes = state.remember(key, lambda: _changes(outer, inner)) if alike else _changes(outer, inner)
     turned = np.maximum(*(np.abs(np.diff(angle, axis=-1, prepend=angle[..., :1])) for angle in (outer, inner)))
     time, after = _once(state.time), _once(since)

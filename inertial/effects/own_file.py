@@ -51,10 +51,10 @@ def raised_in(source: Path, error: Exception) -> str:
     """An exception of a user's file, with the line of the file where it was raised."""
     if isinstance(error, SyntaxError):
         return f"line {error.lineno}: SyntaxError: {error.msg}"
-    own = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).resolve() == source.resolve()]
-    place = f"line {own[-1].lineno}" if own else "outside of the file"
-    inside = f" in {own[-1].name}" if own and own[-1].name != "<module>" else ""
-    return f"{place}{inside}: {type(error).__name__}: {error}"
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).resolve() == source.resolve()]
+    where = f"line {frames[-1].lineno}" if frames else "outside of the file"
+    inside = f" in {frames[-1].name}" if frames and frames[-1].name != "<module>" else ""
+    return f"{where}{inside}: {type(error).__name__}: {error}"
 
 
 def _first_line(kind: type) -> int | str:
@@ -91,15 +91,15 @@ def _shaped(made: Any, needed: tuple[int, ...], where: str, method: str) -> Arra
     """What a method returned, for every unit; refused unless it has the dwells and coefficients of ``needed`` in this order."""
     try:
         values = np.asarray(made, dtype=float)
-        whole = np.broadcast_shapes(values.shape, needed)
+        shape = np.broadcast_shapes(values.shape, needed)
     except (TypeError, ValueError):
-        values = whole = None
-    own = 2 if method == "columns" else 3  # axes that are the effect's: dwells (and force axes) and coefficients
-    if values is None or whole is None or values.shape[-own:] != needed[-own:]:
+        values = shape = None
+    trailing = 2 if method == "columns" else 3  # axes that are the effect's: dwells (and force axes) and coefficients
+    if values is None or shape is None or values.shape[-trailing:] != needed[-trailing:]:
         found = f"shape {np.shape(made)}" if isinstance(made, np.ndarray) else type(made).__name__
         what = "dwells, coefficients" if method == "columns" else "dwells, 3, parameters"
         raise BrokenEffect(
             f"{where}: {method} returned {found}, shape {needed} is needed (…, {what}; as many as names gives); "
             "inertial.effects.base.stack makes it"
         )
-    return values if values.shape == whole else np.broadcast_to(values, whole)
+    return values if values.shape == shape else np.broadcast_to(values, shape)

@@ -26,7 +26,7 @@ class Misfit(Protocol):
         ...
 
 
-_PLACES = 40
+_LOCATIONS = 40
 EDGE = 3  # dwells at both ends after which, or before which, no change can be detected
 _SOAK_APART = 3.0  # K
 
@@ -52,80 +52,80 @@ class Handling(Effect):
     of_one: ClassVar[float] = float("inf")
 
     @abstractmethod
-    def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """The places of the search: values of ``unit``, ``other``, ``dwell``, ``soak`` or ``pose``; units in order."""
+    def locations(self, lot: "Lot") -> list[dict[str, float]]:
+        """The locations to search: values of ``unit``, ``other``, ``dwell``, ``soak`` or ``pose``; units in order."""
 
-    def looks(self, lot: "Lot", places: int) -> int:
-        """Number of places that are paid for: those of the search, unless residuals have chosen them among more."""
-        return places
+    def looks(self, lot: "Lot", locations: int) -> int:
+        """Number of locations in the price: those of the search, or all among which residuals have chosen them."""
+        return locations
 
     @abstractmethod
-    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def change(self, lot: "Lot", slope: Array | None, **location: float) -> Array:
         """Columns of the affected units, (units or 1, n, 3, k), g per unit of the coefficient."""
 
-    def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
-        """Columns (units or 1, n, 3, k) of the alternative in each unit at a place without its ``unit``; 1: the same in all."""
+    def of_each_unit(self, lot: "Lot", slope: Array | None, **location: float) -> Array:
+        """Columns (units or 1, n, 3, k) of the alternative in each unit, at a location without ``unit``; 1: equal in all."""
         units = range(lot.state.time.shape[0])
-        return np.concatenate([self.change(lot, slope, unit=float(unit), **place) for unit in units])
+        return np.concatenate([self.change(lot, slope, unit=float(unit), **location) for unit in units])
 
     @abstractmethod
-    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **location: float) -> str:
         """The description for people; ``size`` (k,) are the coefficients."""
 
-    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
-        """Other places that may explain the same dwells equally well."""
+    def instead(self, lot: "Lot", **location: float) -> list[dict[str, float]]:
+        """Other locations that may explain the same dwells equally well."""
         return []
 
-    def short(self, size: Array, **place: float) -> str:
-        """A short text for one of :meth:`instead`; to be written where that has places."""
-        raise NotImplementedError(f"{self.id}: a short text is missing beside the places of 'instead'")
+    def short(self, size: Array, **location: float) -> str:
+        """A short text for a location of :meth:`instead`; to be written where that gives any."""
+        raise NotImplementedError(f"{self.id}: a short text is missing beside the locations of 'instead'")
 
     def possible(self, size: Array) -> bool:
-        """Whether coefficients (k,) are possible for the alternative; others have another cause of the same shape."""
+        """Whether the alternative can have coefficients (k,); beyond them another cause has its shape."""
         return bool(np.isinf(self.of_one) or 1.0 / self.of_one < size[0] < self.of_one)
 
-    def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
-        """The place and those between it and its neighbours in :meth:`places`."""
-        if "dwell" not in place:
-            return [place]
+    def near(self, lot: "Lot", **location: float) -> list[dict[str, float]]:
+        """The location, and those between it and its neighbours in :meth:`locations`."""
+        if "dwell" not in location:
+            return [location]
         n, step = lot.state.time.shape[1], stride(lot)
-        low, high = max(1, int(place["dwell"]) - step + 1), min(n - 1, int(place["dwell"]) + step - 1)
-        return [{**place, "dwell": float(k)} for k in range(low, high + 1)]
+        low, high = max(1, int(location["dwell"]) - step + 1), min(n - 1, int(location["dwell"]) + step - 1)
+        return [{**location, "dwell": float(k)} for k in range(low, high + 1)]
 
-    def placed(self, lot: "Lot", **place: float) -> dict[str, float]:
-        """The place once more in a lot with the dwells that were left out of the search."""
-        return place
+    def placed(self, lot: "Lot", **location: float) -> dict[str, float]:
+        """The location in a lot with the dwells that were left out of the search."""
+        return location
 
-    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
-        """The lot without it; None if only its term in the model removes it."""
+    def mended(self, lot: "Lot", size: Array, **location: float) -> "Lot | None":
+        """The lot with the error corrected; None if only its term in the model removes it."""
         return None
 
-    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
-        """The same if it needs more than the coefficients: ``misfit`` is the misfit of the model on a lot of some units."""
-        return self.mended(lot, size, **place)
+    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **location: float) -> "Lot | None":
+        """The mended lot if it needs more than the coefficients; ``misfit`` is that of the model on a lot of some units."""
+        return self.mended(lot, size, **location)
 
-    def dwells(self, lot: "Lot", **place: float) -> list[int]:
-        """Places of the affected dwells: the first after a change, or each one that is wrong."""
-        return [int(place["dwell"])] if "dwell" in place else []
+    def dwells(self, lot: "Lot", **location: float) -> list[int]:
+        """Indices of the affected dwells: the first after a change, or every wrong dwell."""
+        return [int(location["dwell"])] if "dwell" in location else []
 
-    def units(self, **place: float) -> tuple[int, ...]:
+    def units(self, **location: float) -> tuple[int, ...]:
         """The affected units; none where all are."""
-        return tuple(int(place[name]) for name in ("unit", "other") if name in place)
+        return tuple(int(location[name]) for name in ("unit", "other") if name in location)
 
-    def columns(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def columns(self, lot: "Lot", slope: Array | None, **location: float) -> Array:
         """Columns of all blocks, (blocks, n, k); zero in unaffected units."""
-        change = of_outputs(lot, self.change(lot, slope, **place))
+        change = of_outputs(lot, self.change(lot, slope, **location))
         units, n = lot.state.time.shape
-        whole = np.zeros((units, n, len(lot.state.axes), change.shape[-1]))
-        if "unit" in place:
-            whole[int(place["unit"])] = change[0]
+        changes = np.zeros((units, n, len(lot.state.axes), change.shape[-1]))
+        if "unit" in location:
+            changes[int(location["unit"])] = change[0]
         else:
-            whole[:] = change
-        return by_block(whole)
+            changes[:] = change
+        return by_block(changes)
 
 
 class OfOneDwell(Handling):
-    """A handling error each of whose places is one dwell, ``at``: all of them are searched in one pass."""
+    """A handling error of a single dwell, ``at``: all dwells are searched in one pass."""
 
     @abstractmethod
     def every_dwell(self, lot: "Lot") -> Array:
@@ -138,14 +138,14 @@ def of_outputs(lot: "Lot", change: Array) -> Array:
 
 
 def by_block(change: Array) -> Array:
-    """(units, n, m, k) as (m·units, n, k)."""
+    """Columns (units, n, m, k) by block, (m·units, n, k)."""
     units, n, m, k = change.shape
     return np.swapaxes(change, 1, 2).reshape(m * units, n, k)
 
 
 def stride(lot: "Lot") -> int:
-    """Distance in dwells of the places of the first search for a change."""
-    return max(1, int(np.ceil(lot.state.time.shape[1] / _PLACES)))
+    """Distance in dwells of the locations of the first search for a change."""
+    return max(1, int(np.ceil(lot.state.time.shape[1] / _LOCATIONS)))
 
 
 def times(lot: "Lot") -> list[int]:
@@ -155,7 +155,7 @@ def times(lot: "Lot") -> list[int]:
 
 
 def after(lot: "Lot", dwell: float) -> Array:
-    """One from a dwell on, (n,)."""
+    """Step (n,): 0 before a dwell, 1 from it on."""
     return (np.arange(lot.state.time.shape[1]) >= dwell).astype(np.float64)
 
 
@@ -203,7 +203,7 @@ def pose_errors(state: State) -> Array:
     force = common(np.broadcast_to(state.force, (*state.time.shape, 3)))
     if len(force) > 1:
         return np.zeros((*state.force.shape, 0))
-    # of dwells of one pose the same, though their forces may be some µg apart
+    # dwells of one pose have the same two directions, though their forces may be some µg apart
     least = np.eye(3)[np.argmin(np.round(np.abs(force), 3), axis=-1)]
     first = np.cross(least, force)
     first *= np.linalg.norm(force, axis=-1, keepdims=True) / np.maximum(

@@ -21,7 +21,7 @@ def eigen(gram: Array) -> tuple[Array, Array]:
 
 
 def _eigen_of_two(gram: Array) -> tuple[Array, Array]:
-    """The same of two rows and columns, by the angle of their main axes."""
+    """Eigenvalues (..., 2) and vectors (..., 2, 2) of symmetric matrices (..., 2, 2), by the angle of their main axes."""
     first, second, beside = gram[..., 0, 0], gram[..., 1, 1], gram[..., 1, 0]
     half = 0.5 * (first - second)
     reach, middle = np.hypot(half, beside), 0.5 * (first + second)
@@ -78,16 +78,16 @@ def basis(columns: Array) -> tuple[Array, Places, float]:
     return q, keep.sum(axis=-1), determinant or 0.0
 
 
-def schur(gram: Array, whole: Array | None = None) -> float:
+def schur(gram: Array, full: Array | None = None) -> float:
     """Sum of squares of the first target after the others.
 
-    whole : products of the targets of which these are left; a target of which rounding is left explains nothing
+    full : products of the targets of which these are left; a target of which rounding is left explains nothing
     """
-    own = np.diag(gram)[1:]
-    seen = own > (0.0 if whole is None else _LEFT * np.diag(whole)[1:])
+    squares = np.diag(gram)[1:]
+    seen = squares > (0.0 if full is None else _LEFT * np.diag(full)[1:])
     if not seen.any():
         return float(gram[0, 0])
-    size = np.sqrt(own[seen])
+    size = np.sqrt(squares[seen])
     inner = gram[1:, 1:][np.ix_(seen, seen)] / np.outer(size, size)
     cross = gram[1:, 0][seen] / size
     return float(gram[0, 0] - cross @ np.linalg.lstsq(inner, cross, rcond=1e-8)[0])

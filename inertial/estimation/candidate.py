@@ -82,8 +82,8 @@ def shared_rows(columns: Array, per_unit: int) -> Places | None:
     units = units and bool(np.all(by_unit == by_unit[:1]))
     if not axes and not units:
         return None
-    place = np.arange(blocks)
-    unit, axis = (0 if units else place // per_unit), (0 if axes else place % per_unit)
+    block = np.arange(blocks)
+    unit, axis = (0 if units else block // per_unit), (0 if axes else block % per_unit)
     return unit * (1 if axes else per_unit) + axis + np.zeros(blocks, dtype=np.intp)
 
 

@@ -99,8 +99,8 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
 def _shrinkable(model: Model, count: int) -> Flags:
     """The local coefficients that are shrunk: those of the effects beyond bias, scale and misalignment."""
     flags = np.zeros(count, dtype=bool)
-    for term, own in model.places(shared=False):
-        flags[own] = term.effect.id not in OWN
+    for term, columns in model.slices(shared=False):
+        flags[columns] = term.effect.id not in OWN
     return flags
 
 
@@ -126,7 +126,7 @@ def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
 
 
 def _with_start(problem: Problem, terms: Sequence[Term]) -> Array:
-    """The same with them."""
+    """Columns (blocks, n, p) of terms, then those of the unknown state of their memory."""
     return np.concatenate([_columns(problem, terms), *(t.start(problem) for t in terms)], axis=-1)
 
 
@@ -211,8 +211,8 @@ def slope_of(model: Model) -> Array | None:
         )
         moved = replace(state, temperature=state.temperature + sign * _WARMER, history=history, memory={})
         problem = Problem(replace(lot, state=moved))
-        whole = _columns(problem, [t for t in fit.terms if not t.shared])
-        ends.append(np.einsum("bnp,bp->bn", whole, fit.local[:, : whole.shape[-1]]))
+        columns = _columns(problem, [t for t in fit.terms if not t.shared])
+        ends.append(np.einsum("bnp,bp->bn", columns, fit.local[:, : columns.shape[-1]]))
     slope = (ends[0] - ends[1]) / (2.0 * _WARMER)
     if float(np.max(np.abs(slope))) <= 0.0:
         return None

@@ -30,7 +30,7 @@ _WHITENERS = 18_000_000
 """Largest number of stored whiteners."""
 
 _PRODUCTS = 2_000_000
-"""Largest number of products of columns that are kept."""
+"""Largest number of stored products of columns."""
 
 LARGE = 15_000
 """Values of a column of all blocks above which columns are not stored between passes: a store has room for a small part of those
@@ -81,7 +81,7 @@ class Covariance:
         self.span = max(float(np.ptp(time)), 1.0)
         self._kernels, self._groups = grouped(time, error, direction, self.level, self.white, loudness)
         self._whiteners: OrderedDict[tuple[int, int | None, int | None], Whitener] = OrderedDict()
-        self._kept: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
+        self._store: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
         self._used = 0
 
     @cached_property
@@ -98,16 +98,16 @@ class Covariance:
         return flicker, walk
 
     def forget(self) -> None:
-        """Drop the products that are kept."""
-        self._kept.clear()
+        """Drop the stored products."""
+        self._store.clear()
         self._used = 0
 
-    def like(self, whole: "Covariance") -> None:
+    def like(self, larger: "Covariance") -> None:
         """Take the whiteners of another covariance, of more blocks, where the blocks of each have one in common."""
-        kernels, whiteners = whole._kernels, whole._whiteners  # noqa: SLF001  # of its own kind
-        one, other = self._kernels[0], kernels[0]
-        same = len(self._kernels) == len(kernels) == 1 and other.fits(one.time, one.there, one.profile)
-        if same and np.array_equal(one.time, other.time):
+        kernels, whiteners = larger._kernels, larger._whiteners  # noqa: SLF001  # of its own kind
+        kernel, other = self._kernels[0], kernels[0]
+        same = len(self._kernels) == len(kernels) == 1 and other.fits(kernel.time, kernel.there, kernel.profile)
+        if same and np.array_equal(kernel.time, other.time):
             self._whiteners = whiteners
 
     def squares_left(self, noise: Noise, local: Array, shared: Array, residual: Array) -> tuple[float, float]:
@@ -126,11 +126,11 @@ class Covariance:
         for members, variance, white in self._variances(noise.shares):
             for some in _pieces(members, local[0].size):
                 size = (self.level * noise.scale)[some] ** 2 / self.white
-                own, common = local[some], shared[some]
-                along, beside = variance @ own, variance @ common
-                inner = np.swapaxes(own, -1, -2) @ along
-                free = beside - own @ (np.swapaxes(own, -1, -2) @ beside)
-                each = np.diagonal(variance) + np.sum((own @ inner - 2.0 * along) * own, axis=-1)
+                basis, common = local[some], shared[some]
+                along, beside = variance @ basis, variance @ common
+                inner = np.swapaxes(basis, -1, -2) @ along
+                free = beside - basis @ (np.swapaxes(basis, -1, -2) @ beside)
+                each = np.diagonal(variance) + np.sum((basis @ inner - 2.0 * along) * basis, axis=-1)
                 each = each - 2.0 * np.sum(free * common, axis=-1)
                 left += float(np.sum(size[:, None] * white**2 * each))
                 held += float(np.sum((white * residual[some]) ** 2))
@@ -143,11 +143,11 @@ class Covariance:
 
         Both are zero where a dwell is missing.
         """
-        for place, steps, blocks, common in self._groups_at(shares):
-            kernel = self._kernels[place]
+        for index, steps, blocks, common in self._groups_at(shares):
+            kernel = self._kernels[index]
             variance = np.diag(kernel.there.astype(np.float64))
             for share, each in zip((common.flicker, common.walk), self._wander or (), strict=False):
-                louder = share * 10.0 ** (steps / SHARE_STEP) * each[place] / np.outer(kernel.profile, kernel.profile)
+                louder = share * 10.0 ** (steps / SHARE_STEP) * each[index] / np.outer(kernel.profile, kernel.profile)
                 variance += np.where(np.outer(kernel.there, kernel.there), louder, 0.0)
             yield blocks, variance, np.where(kernel.there, kernel.white, 0.0)
 
@@ -158,29 +158,29 @@ class Covariance:
     def _of_wander(self, shares: Shares, variance_of: Callable[[Array], float]) -> Array:
         """A variance of the wander of each block over its white variance, (blocks,), from the covariance of its dwells."""
         variance = np.zeros(len(self.level))
-        for place, steps, blocks, common in self._groups_at(shares) if self._wander is not None else ():
-            there = self._kernels[place].there
+        for index, steps, blocks, common in self._groups_at(shares) if self._wander is not None else ():
+            there = self._kernels[index].there
             for share, kernel in zip((common.flicker, common.walk), self._wander or (), strict=True):
-                own = self._kernels[place].louder(kernel[place])[np.ix_(there, there)]
-                variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * variance_of(own)
+                covariance = self._kernels[index].louder(kernel[index])[np.ix_(there, there)]
+                variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * variance_of(covariance)
         return variance
 
     def _groups_at(self, shares: Shares) -> list[tuple[int, int, Places, Shares]]:
-        """Groups of blocks that have a whitener in common at shares: place of the profile, steps, blocks, and their shares."""
+        """Groups of blocks that have a whitener in common at shares: index of the profile, steps, blocks, and their shares."""
         common = shares.common
-        if not shares.own:
+        if not shares.by_block:
             return [(*group, common) for group in self._groups]
-        apart = np.array([block for block, _, _ in shares.own])
-        groups = [(place, steps, blocks[~np.isin(blocks, apart)], common) for place, steps, blocks in self._groups]
+        apart = np.array([block for block, _, _ in shares.by_block])
+        groups = [(index, steps, blocks[~np.isin(blocks, apart)], common) for index, steps, blocks in self._groups]
         groups = [group for group in groups if group[2].size]
-        for block, flicker, walk in shares.own:
+        for block, flicker, walk in shares.by_block:
             groups.append((*self._group_of[block], np.array([block]), Shares(flicker, walk)))
         return groups
 
     @cached_property
     def _group_of(self) -> dict[int, tuple[int, int]]:
-        """Place of the profile of each block, and its steps."""
-        return {int(block): (place, steps) for place, steps, blocks in self._groups for block in blocks}
+        """Index of the profile of each block, and its steps."""
+        return {int(block): (index, steps) for index, steps, blocks in self._groups for block in blocks}
 
     def like_of(self, block: int, noise: Noise) -> tuple[object, ...]:
         """What blocks have in common whose noise differs by a factor alone."""
@@ -190,13 +190,13 @@ class Covariance:
         """What makes the noise of a block at shares white."""
         return self._whitener(*self._group_of[block], shares)
 
-    def _whitener(self, place: int, steps: int, shares: Shares) -> Whitener:
+    def _whitener(self, profile_index: int, steps: int, shares: Shares) -> Whitener:
         index = [None if step is None else step + steps for step in _lattice(shares)]
-        key = (place, index[0], index[1])
+        key = (profile_index, index[0], index[1])
         if key not in self._whiteners:
             wander = self._wander if index != [None, None] else None
-            kernels = None if wander is None else (wander[0][place], wander[1][place])
-            self._whiteners[key] = whitener_of(self._kernels[place], index, kernels)
+            kernels = None if wander is None else (wander[0][profile_index], wander[1][profile_index])
+            self._whiteners[key] = whitener_of(self._kernels[profile_index], index, kernels)
             # applied to many blocks, a whitener costs little beside its use
             room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 6
             most = max(room // self.there.shape[1] ** 2, 4)
@@ -206,16 +206,16 @@ class Covariance:
         return self._whiteners[key]
 
     def _by_whitener(self, shares: Shares, blocks: Places | None = None) -> Iterator[tuple[Places, Whitener]]:
-        """Places, among all or some blocks, of those that share a whitener, and it."""
+        """Positions, among all or some blocks, of those that share a whitener, and the whitener."""
         where = np.arange(len(self.level))
         if blocks is not None:
             where = np.full(len(self.level), -1)
             where[blocks] = np.arange(blocks.size)
-        for place, steps, members, common in self._groups_at(shares):
-            own = where[members]
-            own = own[own >= 0]
-            if own.size:
-                yield own, self._whitener(place, steps, common)
+        for index, steps, members, common in self._groups_at(shares):
+            positions = where[members]
+            positions = positions[positions >= 0]
+            if positions.size:
+                yield positions, self._whitener(index, steps, common)
 
     def whiten(self, columns: Array, shares: Shares, blocks: Places | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
@@ -238,31 +238,31 @@ class Covariance:
         return drawn
 
     def white_rows(self, rows: Array, shares: Shares, blocks: slice) -> Array:
-        """Series (b, m, n) of some blocks with white noise of variance one over their level in them, in their place."""
-        for own, whitener in self._by_whitener(shares, np.arange(len(self.level))[blocks]):
-            if own.size == len(rows):
+        """Series (b, m, n) of some blocks with white noise of variance one over their level in them, overwritten."""
+        for members, whitener in self._by_whitener(shares, np.arange(len(self.level))[blocks]):
+            if members.size == len(rows):
                 return whitener.rows(rows, overwrite=True)
-            rows[own] = whitener.rows(rows[own], overwrite=True)
+            rows[members] = whitener.rows(rows[members], overwrite=True)
         return rows
 
     def back(self, rows: Array, shares: Shares, blocks: Places | None = None) -> Array:
         """Rows (blocks, k, n) of whitened series of all or some blocks times the whiteners, for white noise of variance one."""
         out = np.empty(rows.shape)
-        for own, whitener in self._by_whitener(shares, blocks):
-            for some in _pieces(own, rows[0].size):
+        for members, whitener in self._by_whitener(shares, blocks):
+            for some in _pieces(members, rows[0].size):
                 out[some] = whitener.back(rows[some])
         return out
 
-    def solved(self, columns: Array, places: Places, shares: Shares) -> Iterator[tuple[Places, Places, Array]]:
+    def solved(self, columns: Array, column_of: Places, shares: Shares) -> Iterator[tuple[Places, Places, Array]]:
         """V⁻¹ times columns, for white noise of variance one: blocks that share a whitener, their columns, and rows (k, n).
 
         Parameters
         ----------
-        columns : (rows, n); places : (blocks, p), the columns of each block
+        columns : (rows, n); column_of : (blocks, p), the columns of each block
         """
         for members, whitener in self._by_whitener(shares):
-            own = np.unique(places[members])
-            yield members, own, whitener.back(whitener.rows(columns[own]))
+            distinct = np.unique(column_of[members])
+            yield members, distinct, whitener.back(whitener.rows(columns[distinct]))
 
     def precision(self, noise: Noise) -> Array:
         """Diagonal of V⁻¹ of every block, (blocks, n), 1/g²; zero where a dwell is missing."""
@@ -274,21 +274,21 @@ class Covariance:
     def products(self, candidate: Candidate, shares: Shares) -> Array:
         """Products cᵀV⁻¹c of columns with each other, for each value of their nonlinear parameters, (b, grid, p, p).
 
-        They depend on the columns and the shares alone, and are kept for the models that are tried at the same shares.
+        They depend on the columns and the shares alone, and are stored for the models that are tried at the same shares.
         """
         name = (candidate.key, shares)
-        kept = None if candidate.key is None else self._kept.get(name)
-        if kept is None:
+        stored = None if candidate.key is None else self._store.get(name)
+        if stored is None:
             level = self.level if candidate.blocks is None else self.level[candidate.blocks]
-            kept = _products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
+            stored = _products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
             if candidate.key is not None:
-                self._kept[name] = kept
-                self._used += kept.size
-                while self._used > _PRODUCTS and self._kept:
-                    self._used -= self._kept.popitem(last=False)[1].size
+                self._store[name] = stored
+                self._used += stored.size
+                while self._used > _PRODUCTS and self._store:
+                    self._used -= self._store.popitem(last=False)[1].size
         else:
-            self._kept.move_to_end(name)
-        return kept
+            self._store.move_to_end(name)
+        return stored
 
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""
@@ -299,11 +299,11 @@ class Covariance:
 
     def of_dwells(self, block: int, noise: Noise, dwells: Places) -> Array:
         """Covariance (k, k), g², of some dwells of a block."""
-        place, steps = self._group_of[block]
-        kernel = self._kernels[place]
+        index, steps = self._group_of[block]
+        kernel = self._kernels[index]
         covariance, shares = np.diag(kernel.white**2), noise.shares.of_block(block)
         for share, each in zip((shares.flicker, shares.walk), self._wander or (), strict=False):
-            covariance = covariance + share * 10.0 ** (steps / SHARE_STEP) * kernel.louder(each[place])
+            covariance = covariance + share * 10.0 ** (steps / SHARE_STEP) * kernel.louder(each[index])
         return covariance[np.ix_(dwells, dwells)] * float(self.level[block] * noise.scale[block]) ** 2
 
     def white_noise(self) -> Noise:
@@ -327,10 +327,10 @@ def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[Plac
     count, _, grid, p = columns.shape
     row_of = np.arange(count) if candidate.rows is None else candidate.rows
     out = np.empty((level.size, grid, p, p))
-    for own, whitener in groups:
-        rows, back = np.unique(row_of[own], return_inverse=True)
+    for members, whitener in groups:
+        rows, back = np.unique(row_of[members], return_inverse=True)
         parts = [_squares(columns[some], whitener) for some in _pieces(rows, columns[0].size)]
-        out[own] = np.concatenate(parts)[back]
+        out[members] = np.concatenate(parts)[back]
     return out / level[:, None, None, None] ** 2
 
 

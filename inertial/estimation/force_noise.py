@@ -59,7 +59,7 @@ def by_force(model: Model, soak: Places | None = None) -> Array | None:
     complete = covariance.there.reshape(units, -1).all(axis=1)
     if q is None or not complete.any():
         return None
-    whole = np.repeat(complete, problem.per_unit)
+    complete_blocks = np.repeat(complete, problem.per_unit)
     fitted = estimate(model)
     series = problem.y - np.einsum("bnp,bp->bn", model.local, fitted.local)
     if model.shared.shape[-1]:
@@ -74,16 +74,16 @@ def by_force(model: Model, soak: Places | None = None) -> Array | None:
     alone = (problem.error / covariance.level[:, None]) ** 2 * scale
     projector = np.eye(n) - q @ q.T
     slow = _slow_left(model, projector) * scale
-    alone[~whole] = alone[whole].mean()
-    sizes = _by_class((left**2 / (alone @ projector**2 + slow))[whole], along[whole])
+    alone[~complete_blocks] = alone[complete_blocks].mean()
+    sizes = _by_class((left**2 / (alone @ projector**2 + slow))[complete_blocks], along[complete_blocks])
     if sizes is None or not differ(sizes):
         return None
     variance = np.ones_like(left)
     for _ in range(_ROUNDS):  # each dwell's residual holds noise of the others
         white = (alone * variance) @ projector**2
-        ratio = (left**2 / (white + slow))[whole]
+        ratio = (left**2 / (white + slow))[complete_blocks]
         ratio /= ratio.mean(axis=1, keepdims=True)
-        curve = _curve(along[whole], np.minimum(ratio, _capped(ratio, along[whole])), along)
+        curve = _curve(along[complete_blocks], np.minimum(ratio, _capped(ratio, along[complete_blocks])), along)
         variance *= np.maximum((curve * (white + slow) - slow) / white, _LEAST)
         variance = np.maximum(variance / np.mean(variance, axis=1, keepdims=True), _LEAST)
     return np.swapaxes(np.sqrt(variance).reshape(units, problem.per_unit, n), 1, 2)
@@ -115,9 +115,9 @@ def _slow_left(model: Model, projector: Array) -> Array:
         like = covariance.like_of(block, model.noise)
         if like not in known:
             size = float(covariance.level[block] * model.noise.scale[block]) ** 2
-            whole = covariance.of_dwells(block, model.noise, dwells) / size
-            whole -= np.diag((model.problem.error[block] / covariance.level[block]) ** 2)
-            known[like] = np.maximum(np.einsum("ij,ij->i", projector @ whole, projector), 0.0)
+            slow_covariance = covariance.of_dwells(block, model.noise, dwells) / size
+            slow_covariance -= np.diag((model.problem.error[block] / covariance.level[block]) ** 2)
+            known[like] = np.maximum(np.einsum("ij,ij->i", projector @ slow_covariance, projector), 0.0)
         slow[block] = known[like]
     return slow
 
@@ -125,10 +125,10 @@ def _slow_left(model: Model, projector: Array) -> Array:
 def _by_class(ratio: Array, along: Array) -> Array | None:
     """Logarithms (blocks, classes) of the mean square of each class of force; None where there is but one class."""
     classes = np.digitize(along, _EDGES)
-    whole = [k for k in range(len(_EDGES) + 1) if np.all(np.sum(classes == k, axis=1) >= _FEWEST)]
-    if len(whole) < 2 or len(ratio) < 2:
+    filled = [k for k in range(len(_EDGES) + 1) if np.all(np.sum(classes == k, axis=1) >= _FEWEST)]
+    if len(filled) < 2 or len(ratio) < 2:
         return None
-    inner = np.stack([inner_mean(np.where(classes == k, np.sqrt(ratio), np.nan)) for k in whole], axis=1)
+    inner = np.stack([inner_mean(np.where(classes == k, np.sqrt(ratio), np.nan)) for k in filled], axis=1)
     return np.log(np.maximum(inner, 1e-300))
 
 

@@ -35,7 +35,7 @@ class Ratio:
     """A term beside a model.
 
     deviance : D, corrected for the noise that units share; rank : coefficients that the plan determines
-    price : of them, and of the places searched; log_p : of the chi-square, one look
+    price : of them, and of the locations searched; log_p : of the chi-square, one look
     shared : φ with the term inside, by which the part common to all units is divided; again : the ratio with another φ
     """
 
@@ -47,7 +47,7 @@ class Ratio:
     again: Callable[[float], "Ratio"] | None = None
 
     def at(self, shared: float) -> "Ratio":
-        """The same with another φ: rivals are compared at a common φ, because the estimate of each scatters."""
+        """The ratio at another φ: rivals are compared at a common φ, because the estimate of each scatters."""
         return self if self.again is None else self.again(shared)
 
     @property
@@ -56,12 +56,12 @@ class Ratio:
         return self.deviance - self.price
 
 
-def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
+def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
     """The likelihood ratio of a term beside a model.
 
     Parameters
     ----------
-    places : number of places searched, for alternatives with a place
+    locations : number of locations searched, for handling errors
     """
     richer = model.with_term(term)
     noises = [model.noise, richer.noise]
@@ -81,17 +81,17 @@ def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
 
     def divided(shared: float) -> Ratio:
         by = max(shared, scatter)
-        ratio = weighed(deviance * (1.0 - along * (1.0 - 1.0 / by)), rank, nonlinear, places)
+        ratio = weighed(deviance * (1.0 - along * (1.0 - 1.0 / by)), rank, nonlinear, locations)
         return replace(ratio, shared=shared, again=divided)
 
     # by what the units share with the term inside: an effect common to all units is not noise
     return divided(shared_noise(richer))
 
 
-def weighed(deviance: float, rank: int, nonlinear: int, places: int = 1) -> Ratio:
+def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1) -> Ratio:
     """A deviance with its price and its probability."""
     coefficients = rank + nonlinear
-    paid = price(deviance, coefficients) + 2.0 * float(np.log(max(places, 1)))
+    paid = price(deviance, coefficients) + 2.0 * float(np.log(max(locations, 1)))
     return Ratio(deviance, rank, paid, float(log_chi2_tail(deviance, coefficients)))
 
 
@@ -171,8 +171,8 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
     inverse = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-4, hermitian=True)
     fitted = (unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ space.residual[..., None])))[..., 0]
     fitted = fitted.reshape(units, model.problem.per_unit, -1)
-    whole = float(np.sum(fitted**2))
-    return float(units * np.sum(fitted.mean(axis=0) ** 2) / whole) if whole > 0.0 else 0.0
+    total = float(np.sum(fitted**2))
+    return float(units * np.sum(fitted.mean(axis=0) ** 2) / total) if total > 0.0 else 0.0
 
 
 def shared_factor(model: Model, term: Term) -> float:
@@ -206,9 +206,9 @@ def correlation_of_units(model: Model) -> float:
 
 def _alike(model: Model, term: Term, units: int) -> float:
     """Part of a term that is equal in every unit, 0 … 1."""
-    for other, own in model.places(shared=False):
+    for other, columns in model.slices(shared=False):
         if other.effect.id == term.effect.id:
-            series = np.einsum("bnp,bp->bn", other.columns(model.problem), estimate(model).local[:, own])
+            series = np.einsum("bnp,bp->bn", other.columns(model.problem), estimate(model).local[:, columns])
             series = (series - series.mean(axis=1, keepdims=True)) / model.problem.error
             return max(_pairwise(series.reshape(units, -1)), 0.0)
     return 1.0
@@ -217,5 +217,5 @@ def _alike(model: Model, term: Term, units: int) -> float:
 def _pairwise(series: Array) -> float:
     """Mean correlation between the rows (units, m), by their common size."""
     units = len(series)
-    whole = float(np.sum(series**2))
-    return 0.0 if whole <= 0.0 else (float(np.sum(series.sum(axis=0) ** 2)) / whole - 1.0) / (units - 1)
+    total = float(np.sum(series**2))
+    return 0.0 if total <= 0.0 else (float(np.sum(series.sum(axis=0) ** 2)) / total - 1.0) / (units - 1)

@@ -47,41 +47,41 @@ def loudness_of(model: Model, soak: Places | None = None) -> Array | None:
         return None
     soak = soaks(problem.lot.state) if soak is None else soak
     members = [np.flatnonzero(soak == k) for k in range(int(soak.max()) + 1)]
-    members = [places for places in members if places.size >= _FEWEST]
+    members = [dwells for dwells in members if dwells.size >= _FEWEST]
     if len(members) < 2:
         return None
     fitted = estimate(model)
     series = problem.y - np.einsum("bnp,bp->bn", model.local, fitted.local)
     if model.shared.shape[-1]:
         series = series - model.shared @ fitted.shared
-    ratios = np.stack([_of_soak(model, series, places) for places in members], axis=1)
+    ratios = np.stack([_of_soak(model, series, dwells) for dwells in members], axis=1)
     ratios = ratios[np.isfinite(ratios).all(axis=1)]
     if len(ratios) < 2 or not differ(ratios):
         return None
     by_soak = np.median(ratios - ratios.mean(axis=1, keepdims=True), axis=0)
     loud = np.ones(problem.n)
-    for places, value in zip(members, by_soak, strict=True):
-        loud[places] = np.exp(0.5 * value)
+    for dwells, value in zip(members, by_soak, strict=True):
+        loud[dwells] = np.exp(0.5 * value)
     return loud / np.sqrt(np.mean(loud**2))
 
 
-def _of_soak(model: Model, series: Array, places: Places) -> Array:
+def _of_soak(model: Model, series: Array, dwells: Places) -> Array:
     """Logarithm (blocks,) of the robust variance of a soak's residuals, less its mean for the model's noise; NaN if none."""
     problem, covariance = model.problem, model.problem.covariance
-    there = covariance.there[:, places]
-    force = np.broadcast_to(problem.lot.state.force, (*problem.lot.state.time.shape, 3))[:, places]
-    time = problem.lot.state.time[:, places]
-    left = np.full((problem.blocks, places.size), np.nan)
+    there = covariance.there[:, dwells]
+    force = np.broadcast_to(problem.lot.state.force, (*problem.lot.state.time.shape, 3))[:, dwells]
+    time = problem.lot.state.time[:, dwells]
+    left = np.full((problem.blocks, dwells.size), np.nan)
     expected = np.full(problem.blocks, np.nan)
-    drawn = np.random.default_rng(places.size).standard_normal((places.size, np.clip(_DRAWN // places.size, 50, 1000)))
+    drawn = np.random.default_rng(dwells.size).standard_normal((dwells.size, np.clip(_DRAWN // dwells.size, 50, 1000)))
     before: tuple[Array, Array] | None = None
     q: Array | None = None
     known: dict[tuple[object, ...], float] = {}
     for block in range(problem.blocks):
-        own = there[block]
-        if np.count_nonzero(own) < _FEWEST:
+        present = there[block]
+        if np.count_nonzero(present) < _FEWEST:
             continue
-        here = force[block // problem.per_unit][own], time[block // problem.per_unit][own]
+        here = force[block // problem.per_unit][present], time[block // problem.per_unit][present]
         if before is None or not all(map(np.array_equal, here, before)):
             # the axes of a unit, and units in the same poses at the same times, have the same columns
             before, x = here, _columns(*here)
@@ -89,11 +89,11 @@ def _of_soak(model: Model, series: Array, places: Places) -> Array:
             known.clear()
         if q is None:
             continue
-        y = series[block, places[own]]
-        left[block, own] = y - q @ (q.T @ y)
+        y = series[block, dwells[present]]
+        left[block, present] = y - q @ (q.T @ y)
         like = covariance.like_of(block, model.noise)
         if like not in known:
-            root = np.linalg.cholesky(covariance.of_dwells(block, model.noise, places[own]))
+            root = np.linalg.cholesky(covariance.of_dwells(block, model.noise, dwells[present]))
             noise = root @ drawn[: len(root)]
             noise -= q @ (q.T @ noise)
             size = float(covariance.level[block] * model.noise.scale[block])
@@ -114,9 +114,9 @@ def _of_soak(model: Model, series: Array, places: Places) -> Array:
 def inner_mean(left: Array) -> Array:
     """Mean of the smaller three quarters of the squares of each row (..., n), NaN where missing: no single bad dwell is in it."""
     size = np.sort(np.where(np.isfinite(left), left, np.inf) ** 2, axis=-1)
-    kept = np.maximum((3 * np.isfinite(left).sum(axis=-1)) // 4, 1)
-    inner = np.arange(size.shape[-1]) < kept[..., None]
-    return np.where(inner, size, 0.0).sum(axis=-1) / kept
+    count = np.maximum((3 * np.isfinite(left).sum(axis=-1)) // 4, 1)
+    inner = np.arange(size.shape[-1]) < count[..., None]
+    return np.where(inner, size, 0.0).sum(axis=-1) / count
 
 
 def _columns(force: Array, time: Array) -> Array | None:

@@ -43,7 +43,7 @@ class Model:
     ----------
     near : noise at which the search for this model's noise starts
     curves, shared_curves : (blocks, n, d), columns of a driver that is not an effect, sized by block or for all blocks
-    known : where the noise of a model of these terms is kept, once it is found
+    known : list that holds the noise of a model of these terms once it is found
     """
 
     def __init__(
@@ -85,14 +85,14 @@ class Model:
         columns += [t.start(self.problem) for t in self.terms if t.shared]
         return np.concatenate(columns, axis=-1)
 
-    def places(self, *, shared: bool) -> list[tuple[Term, slice]]:
+    def slices(self, *, shared: bool) -> list[tuple[Term, slice]]:
         """Terms whose coefficients all blocks share, or do not, and where their columns are; unknown states and curves follow."""
         terms = [t for t in self.terms if t.shared == shared]
         ends = np.cumsum([0, *(t.columns(self.problem).shape[-1] for t in terms)]).tolist()
         return [(term, slice(start, end)) for term, start, end in zip(terms, ends[:-1], ends[1:], strict=True)]
 
     def at(self, noise: Noise) -> Space:
-        """The residuals of the model, whitened for a noise; those for its own noise and for the last other one are kept."""
+        """The residuals of the model, whitened for a noise; the spaces of its own noise and of the last other one are stored."""
         if noise is self.__dict__.get("noise"):
             return self.space
         if self._last is None or self._last.noise is not noise:
@@ -118,15 +118,15 @@ class Model:
         for _ in range(_TURNS):
             space = self._rough(best)
             series = self.problem.y if not self.shared.shape[-1] else self.problem.y - self.shared @ space.shared_sizes
-            own = own_shares(self.problem, series, self.local, space, self._by_products(best))
-            if own == best.own:
+            by_block = own_shares(self.problem, series, self.local, space, self._by_products(best))
+            if by_block == best.by_block:
                 break
             # the others without them, from where they were
-            best = best_shares(self._restricted, best._replace(own=own), finest=finest)
+            best = best_shares(self._restricted, best._replace(by_block=by_block), finest=finest)
         return best
 
     def forget(self) -> None:
-        """Drop what is kept for models that follow: of a large lot it takes much memory."""
+        """Drop what is stored for models that follow: for a large lot it takes much memory."""
         self._spaces.clear()
         self._last = None
         for name in ("space", "_statistics", "_even"):
@@ -173,7 +173,7 @@ class Model:
             return self._near.scale
         if not self._joined:
             return np.ones(self.problem.blocks)
-        # those under white noise, for columns that all share
+        # the variances under white noise, for columns that all share
         space = self._space(self.problem.covariance.white_noise())
         return np.sqrt(moderated(space.squares, space.by_block)[0])
 
@@ -187,9 +187,9 @@ class Model:
         return known
 
     def _deviance(self, shares: Shares) -> tuple[float, bool]:
-        """The same, computed: by the products of the columns if these are precise, else in the whitened space.
+        """The deviance of :meth:`_restricted`, and whether it holds for all models of equal terms.
 
-        And whether it is the same for all models of equal terms.
+        By the products of the columns if these are precise, else in the whitened space.
         """
         quick = self._statistics.left(shares, self._weights)
         if quick is None:
@@ -207,8 +207,8 @@ class Model:
         if float(np.median(dof)) < _OWN:
             return logdet + information + deviance_of(squares, dof)
         known = dof > 0
-        own = dof[known] * np.log(np.maximum(squares[known], 1e-300) / dof[known])
-        return logdet + information + float(np.sum(own))
+        deviances = dof[known] * np.log(np.maximum(squares[known], 1e-300) / dof[known])
+        return logdet + information + float(np.sum(deviances))
 
     def _by_products(self, best: Shares) -> Callable[[int, Shares], float | None]:
         """−2 log restricted likelihood of a block at shares, less the log-determinant; None if products are not precise enough.
@@ -286,9 +286,9 @@ class Model:
 
     def shared_sizes(self, term: Term) -> Array:
         """Coefficients (k,) of a term that all blocks share."""
-        for other, own in self.places(shared=True):
+        for other, columns in self.slices(shared=True):
             if other.key == term.key:  # a model that was kept has an equal term
-                return self.space.shared_sizes[own]
+                return self.space.shared_sizes[columns]
         raise KeyError(f"{term.effect.id}: not a term of the model")
 
     def explained(self, candidate: Candidate, floor: float) -> float:
@@ -333,9 +333,9 @@ class Model:
 
     def held_at(self, shares: Shares) -> "Model":
         """The model with the noise of given shares, as it is and not estimated."""
-        own, common = self._curves, self._shared_curves
+        curves, common = self._curves, self._shared_curves
         known = [self.noise_at(shares)]
-        return Model(self.problem, self.terms, near=self._near, curves=own, shared_curves=common, known=known)
+        return Model(self.problem, self.terms, near=self._near, curves=curves, shared_curves=common, known=known)
 
     def with_shared_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, whose coefficients all blocks share."""

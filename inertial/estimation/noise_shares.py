@@ -20,33 +20,33 @@ LONGEST = 1500
 class Shares(NamedTuple):
     """Variances of 1/f and of random walk at the end of the record, over the lot's white variance.
 
-    own : block, and its variances of 1/f and of random walk, for blocks whose wander is of another kind than the lot's
+    by_block : block, and its variances of 1/f and of random walk, for blocks whose wander is of another kind than the lot's
     """
 
     flicker: float = 0.0
     walk: float = 0.0
-    own: tuple[tuple[int, float, float], ...] = ()
+    by_block: tuple[tuple[int, float, float], ...] = ()
 
     @property
     def common(self) -> "Shares":
-        """Those of the lot, without blocks that have their own."""
+        """The shares of the lot, without those of single blocks."""
         return Shares(self.flicker, self.walk)
 
     def of_block(self, block: int) -> "Shares":
-        """Those of one block: its own, or the lot's."""
-        return next((Shares(flicker, walk) for number, flicker, walk in self.own if number == block), self.common)
+        """The shares of a block: its own, or the lot's."""
+        return next((Shares(flicker, walk) for number, flicker, walk in self.by_block if number == block), self.common)
 
     def pick(self, blocks: list[int]) -> "Shares":
         """The shares of some blocks, numbered as they are given."""
-        if not self.own:
+        if not self.by_block:
             return self
-        by_block = {block: rest for block, *rest in self.own}
-        of_picked = [(number, *by_block[block]) for number, block in enumerate(blocks) if block in by_block]
-        return self._replace(own=tuple(of_picked))
+        rest_of = {block: rest for block, *rest in self.by_block}
+        of_picked = [(number, *rest_of[block]) for number, block in enumerate(blocks) if block in rest_of]
+        return self._replace(by_block=tuple(of_picked))
 
     def times(self, flicker: float, walk: float) -> "Shares":
         """Each share times a factor of its kind."""
-        of_blocks = tuple((block, flicker * first, walk * second) for block, first, second in self.own)
+        of_blocks = tuple((block, flicker * first, walk * second) for block, first, second in self.by_block)
         return Shares(flicker * self.flicker, walk * self.walk, of_blocks)
 
 

@@ -28,8 +28,8 @@ def fall(space: Space, gain: Gain) -> np.ndarray:
     """Reduction of the deviance (grid,) by a candidate at the noise of a space, with the variances estimated again."""
     prior = space.noise.prior
     if np.isfinite(prior) and gain.by_block.any():
-        whole = (space.by_block + prior)[:, None]
-        return np.sum(-whole * np.log1p(-np.minimum(gain.by_block / np.maximum(whole, 1e-9), 0.999)), axis=0)
+        degrees = (space.by_block + prior)[:, None]
+        return np.sum(-degrees * np.log1p(-np.minimum(gain.by_block / np.maximum(degrees, 1e-9), 0.999)), axis=0)
     dof = max(space.dof, 1)
     return -dof * np.log1p(-np.minimum(gain.drop / max(space.rss, 1e-300), 0.999))
 

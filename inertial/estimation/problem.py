@@ -24,7 +24,7 @@ _PIECE = 1_000_000
 """Number of columns processed at a time."""
 
 _WIDE = 3_000_000
-"""The same of the columns of one effect at several values: each pass over them goes through the model's own columns once."""
+"""Number of elements of an effect's columns that are processed at a time: each pass also goes through the model's columns."""
 
 _WIDEST = 3
 """Usual largest number of columns of an effect per axis."""
@@ -78,7 +78,7 @@ class Problem:
         self.n = n
         self.error = self._error()
         self.y = self._series()
-        self._kept: dict[tuple[object, ...], Candidate] = {}
+        self._store: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
         self.deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
@@ -91,8 +91,8 @@ class Problem:
         return Covariance(time, self.error, self._direction if self.lot.radial else None, self.lot.loudness)
 
     def forget(self) -> None:
-        """Drop the columns and products that are kept: they are made again where they are needed."""
-        self._kept.clear()
+        """Drop the stored columns and products: they are made again where they are needed."""
+        self._store.clear()
         self._terms.clear()
         self._room = _CACHE
         self.covariance.forget()
@@ -116,8 +116,8 @@ class Problem:
         return self.lot.state.force / np.linalg.norm(self.lot.state.force, axis=-1, keepdims=True)
 
     @cached_property
-    def one(self) -> "Problem":
-        """The first unit."""
+    def first_unit(self) -> "Problem":
+        """The problem of the first unit alone."""
         return Problem(self.lot.units([0]))
 
     @property
@@ -133,13 +133,13 @@ class Problem:
     def columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
         """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
         key = (effect.id, *values.items())
-        kept = self._terms.get(key)
-        if kept is None:
-            kept = self._columns(effect, values)
-            if kept.size < self._room:
-                self._room -= kept.size
-                self._terms[key] = kept
-        return kept
+        stored = self._terms.get(key)
+        if stored is None:
+            stored = self._columns(effect, values)
+            if stored.size < self._room:
+                self._room -= stored.size
+                self._terms[key] = stored
+        return stored
 
     def _columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
         if isinstance(effect, Handling):
@@ -151,7 +151,7 @@ class Problem:
                     effect,
                     values,
                     self.axes,
-                    lambda axis, own: excited(effect, effect.columns(state, axis, **own)),
+                    lambda axis, nonlinear: excited(effect, effect.columns(state, axis, **nonlinear)),
                 )
             )
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
@@ -165,7 +165,9 @@ class Problem:
         state = self.lot.state
         if isinstance(effect, SensorEffect):
             return self._by_axis(
-                _of_axes(effect, values, self.axes, lambda axis, own: effect.start_columns(state, axis, **own))
+                _of_axes(
+                    effect, values, self.axes, lambda axis, nonlinear: effect.start_columns(state, axis, **nonlinear)
+                )
             )
         return self.seen(effect.start_change(state, **on_axis(values, 0)))
 
@@ -204,14 +206,14 @@ class Problem:
         return self._stored(key, lambda: self.varied(effect, grid, first=first, key=key))
 
     def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
-        """A candidate, made where it is not kept, and kept where its columns have room."""
-        kept = self._kept.get(key)
-        if kept is None:
-            kept = make()
-            if kept.columns.size < self._room:
-                self._room -= kept.columns.size
-                self._kept[key] = kept
-        return kept
+        """A candidate, from the store or made; stored where its columns have room."""
+        candidate = self._store.get(key)
+        if candidate is None:
+            candidate = make()
+            if candidate.columns.size < self._room:
+                self._room -= candidate.columns.size
+                self._store[key] = candidate
+        return candidate
 
     @property
     def at_a_time(self) -> int:
@@ -227,31 +229,31 @@ class Problem:
         start: bool = False,
         key: object = None,
     ) -> Candidate:
-        """Columns of an effect over values, those of one value after another; rows that blocks share are stored once.
+        """Columns of an effect over values, value after value; rows that blocks share are stored once.
 
         Parameters
         ----------
         start : whether columns of the unknown state of a memory follow
-        key : under which the candidate is kept; None where it is tried once
+        key : under which the candidate is stored; None where it is tried once
         """
         shared = effect.scope in SHARED
         every: list[Array] = []
         rows_of: list[Places | None] = []
         for values in grid:
             known = self._terms.get((effect.id, *values.items()))
-            own = (self._columns(effect, values) if known is None else known)[..., :first]
+            part = (self._columns(effect, values) if known is None else known)[..., :first]
             if start:
-                own = np.concatenate([own, self.start(effect, values)], axis=-1)
-            rows = None if shared else shared_rows(own, self.per_unit)
-            every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
+                part = np.concatenate([part, self.start(effect, values)], axis=-1)
+            rows = None if shared else shared_rows(part, self.per_unit)
+            every.append(part if rows is None else part[np.unique(rows, return_index=True)[1]])
             rows_of.append(rows)
         rows = finest_rows(rows_of, self.per_unit)
         count = self.blocks if rows is None else int(rows.max()) + 1
         columns = np.empty((count, len(grid), every[0].shape[-1], self.n))
-        for place, (own, of_own) in enumerate(zip(every, rows_of, strict=True)):
-            if len(own) < count and of_own is not None:
-                own = own[of_own if rows is None else of_own[np.unique(rows, return_index=True)[1]]]  # noqa: PLW2901
-            columns[:, place] = np.swapaxes(own, -1, -2)
+        for k, (part, of_own) in enumerate(zip(every, rows_of, strict=True)):
+            if len(part) < count and of_own is not None:
+                part = part[of_own if rows is None else of_own[np.unique(rows, return_index=True)[1]]]  # noqa: PLW2901
+            columns[:, k] = np.swapaxes(part, -1, -2)
         return Candidate(columns.transpose(0, 3, 1, 2), shared, rows=rows, key=key)
 
     def pieces(
@@ -259,7 +261,7 @@ class Problem:
     ) -> Iterator[Candidate]:
         """The candidate of an effect in pieces of its grid, small enough to limit the memory for large lots."""
         if isinstance(effect, Handling):
-            yield from self._places(effect, grid)
+            yield from self._at_locations(effect, grid)
             return
         size, begin = self.at_a_time, 0
         while begin < len(grid):
@@ -269,27 +271,27 @@ class Problem:
             if made.rows is not None:
                 size = max(1, _PIECE // made.columns[:, :, 0].size)
 
-    def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
-        """The places of an alternative, those of units one unit after another, no more at a time than a piece has room for."""
+    def _at_locations(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
+        """Columns of an alternative at its locations, unit after unit, no more at a time than a piece has room for."""
         if grid and ("unit" not in grid[0] or "other" in grid[0]):
             alike = len(effect.change(self.lot, self.slope, **on_axis(grid[0], 0))) == 1
             size = max(1, _PIECE // ((len(self.axes) if alike else self.blocks) * self.n * _WIDEST))
             for start in range(0, len(grid), size):
                 yield self._together(effect, grid[start : start + size])
             return
-        by_unit = [list(places) for _, places in groupby(grid, key=lambda values: values["unit"])]
-        for places, alike in groupby(by_unit, key=_without_unit):
-            units = np.array([int(on_axis({"unit": own[0]["unit"]}, 0)["unit"]) for own in alike])
-            size = max(1, _PIECE // (len(self.axes) * self.n * _WIDEST * len(places)))
-            yield from self._of_units(effect, units, [dict(place) for place in places], size)
+        by_unit = [list(locations) for _, locations in groupby(grid, key=lambda values: values["unit"])]
+        for locations, alike in groupby(by_unit, key=_without_unit):
+            units = np.array([int(on_axis({"unit": of_unit[0]["unit"]}, 0)["unit"]) for of_unit in alike])
+            size = max(1, _PIECE // (len(self.axes) * self.n * _WIDEST * len(locations)))
+            yield from self._of_units(effect, units, [dict(location) for location in locations], size)
 
-    def _of_units(self, effect: Handling, units: Places, places: Sequence[Values], size: int) -> Iterator[Candidate]:
-        """The places of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
-        key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
+    def _of_units(self, effect: Handling, units: Places, locations: Sequence[Values], size: int) -> Iterator[Candidate]:
+        """Columns of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
+        key = (effect.id, units.size, int(units[0]), len(locations), *locations[0].items(), *locations[-1].items())
 
         def made() -> Candidate:
             columns = np.stack(
-                [of_outputs(self.lot, effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0))) for p in places],
+                [of_outputs(self.lot, effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0))) for p in locations],
                 axis=3,
             )
             few, n, m, g, k = columns.shape
@@ -297,21 +299,21 @@ class Problem:
             by_block = np.swapaxes(columns, 1, 2).reshape(m * few, n, g, k)
             return Candidate(by_block, shared=True, rows=rows, units=units, key=key, per_unit=m)
 
-        kept = self._stored(key, made)
-        if kept.rows is not None:
-            yield kept
+        candidate = self._stored(key, made)
+        if candidate.rows is not None:
+            yield candidate
             return
         for start in range(0, units.size, size):
             some = units[start : start + size]
             blocks = blocks_of_units(some, len(self.axes))
-            yield replace(kept, columns=kept.columns[blocks], units=some, key=(*key, start, size))
+            yield replace(candidate, columns=candidate.columns[blocks], units=some, key=(*key, start, size))
 
-    def _together(self, effect: Handling, places: Sequence[Values]) -> Candidate:
-        """An alternative of the whole lot at some places."""
-        key = (effect.id, len(places), *places[0].items(), *places[-1].items())
+    def _together(self, effect: Handling, locations: Sequence[Values]) -> Candidate:
+        """Columns of an alternative of the whole lot at some locations."""
+        key = (effect.id, len(locations), *locations[0].items(), *locations[-1].items())
 
         def made() -> Candidate:
-            changes = [of_outputs(self.lot, effect.change(self.lot, self.slope, **on_axis(p, 0))) for p in places]
+            changes = [of_outputs(self.lot, effect.change(self.lot, self.slope, **on_axis(p, 0))) for p in locations]
             units = self.lot.state.time.shape[0]
             rows = np.tile(np.arange(len(self.axes)), units) if all(len(f) == 1 for f in changes) else None
             if rows is None:
@@ -321,6 +323,6 @@ class Problem:
         return self._stored(key, made)
 
 
-def _without_unit(places: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:
-    """Places of one unit as a key, without the unit."""
-    return tuple(tuple((name, value) for name, value in place.items() if name != "unit") for place in places)
+def _without_unit(locations: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:
+    """Locations in a unit as a key, without the unit."""
+    return tuple(tuple((name, value) for name, value in location.items() if name != "unit") for location in locations)

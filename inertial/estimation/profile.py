@@ -22,7 +22,7 @@ from inertial.estimation.problem import Values
 from inertial.estimation.refinement import around, cell, on_scale
 from inertial.estimation.term import Term
 
-Place = tuple[tuple[str, float | tuple[float, ...]], ...]
+TermValues = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 _JITTER = 1e-8
 """Part of a column, squared, below which a direction is rounding error, as in the fits."""
@@ -49,7 +49,7 @@ class LikelihoodProfile:
         shared = self.space.targets[..., 1:]
         size = np.sqrt(np.einsum("bnq,bnq->q", shared, shared))
         self.shared = shared / np.where(size > 0.0, size, 1.0)
-        self._known: dict[Term, dict[Place, tuple[Array, Array | None]]] = {}
+        self._known: dict[Term, dict[TermValues, tuple[Array, Array | None]]] = {}
 
     @cached_property
     def whole(self) -> Array:
@@ -79,7 +79,7 @@ class LikelihoodProfile:
         return np.where(least - apart > self.by_axis, apart, least)
 
     def _least(self, wrong: Term, grid: Sequence[Values], varied: Sequence[Nonlinear], axis: int | None) -> Array:
-        """The same at the best values of a grid for all sensor axes, or for one.
+        """Least sums of squares (r,) that a wrong effect leaves of the truths, over a grid, for all sensor axes or for one.
 
         Parameters
         ----------
@@ -101,17 +101,17 @@ class LikelihoodProfile:
                 squares = total if axis is None or axes is None else axes[axis]
                 count = len(tried) // len(best)
                 for r in truths:
-                    place = r * count + int(np.argmin(squares[r * count : (r + 1) * count, r]))
-                    if squares[place, r] < least[r]:
-                        best[r], least[r] = tried[place], squares[place, r]
+                    index = r * count + int(np.argmin(squares[r * count : (r + 1) * count, r]))
+                    if squares[index, r] < least[r]:
+                        best[r], least[r] = tried[index], squares[index, r]
                 width *= 0.4
         return least
 
     def _over(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
         """Remaining sums of squares (g, r) at each set of values; by sensor axis (3, g, r) if blocks have own coefficients.
 
-        What is left at a set of values is kept: truths and axes are often best at the same values, and a round begins where the
-        one before it ended.
+        What is left at a set of values is stored: truths and axes are often best at the same values, and a round begins where
+        the previous one ended.
         """
         known = self._known.setdefault(wrong, {})
         names = [tuple(values.items()) for values in grid]
@@ -119,11 +119,11 @@ class LikelihoodProfile:
         if new:
             total, axes = self._at(wrong, [dict(name) for name in new])
             known.update({name: (total[k], None if axes is None else axes[:, k]) for k, name in enumerate(new)})
-        by_axis = [own for name in names if (own := known[name][1]) is not None]
+        by_axis = [of_axes for name in names if (of_axes := known[name][1]) is not None]
         return np.stack([known[name][0] for name in names]), np.stack(by_axis, axis=1) if by_axis else None
 
     def _at(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
-        """The same, computed."""
+        """Remaining sums of squares as of :meth:`_over`, computed."""
         candidate = self.problem.varied(wrong.effect, grid, first=wrong.first, start=True)
         if not wrong.shared:
             return self._local(candidate)
@@ -149,7 +149,7 @@ class LikelihoodProfile:
         return self.space.backed(self._both)
 
     def _local(self, candidate: Candidate) -> tuple[Array, Array | None]:
-        """The same for columns with coefficients by block."""
+        """Remaining sums of squares (g, r), and by axis (3, g, r), after columns with coefficients by block."""
         both = self._both
         r = self.targets.shape[-1]
         found = self.space.products(candidate)
@@ -159,19 +159,19 @@ class LikelihoodProfile:
         values, vectors = eigen(gram)
         along = np.einsum("bgps,bgpt->bgst", vectors, inside, optimize=True) * inverse_roots(values, _JITTER)[..., None]
         if not self.shared.shape[-1]:
-            own = np.einsum("bnt,bnt->bt", both, both)[:, None, :] - np.sum(along**2, axis=2)
-            own = np.maximum(own, 0.0)
+            remaining = np.einsum("bnt,bnt->bt", both, both)[:, None, :] - np.sum(along**2, axis=2)
+            remaining = np.maximum(remaining, 0.0)
             radial = self.problem.lot.radial
             axes = (
                 None
                 if radial or self.problem.per_unit < _AXES
-                else np.stack([own[a::3].sum(axis=0) for a in range(_AXES)])
+                else np.stack([remaining[a::3].sum(axis=0) for a in range(_AXES)])
             )
-            return own.sum(axis=0), axes
-        whole = np.einsum("bnt,bns->ts", both, both) - np.einsum("bgpt,bgps->gts", along, along, optimize=True)
-        inner = np.linalg.pinv(whole[:, r:, r:], rcond=_JITTER, hermitian=True)
-        taken = np.einsum("gtq,gqs,gts->gt", whole[:, :r, r:], inner, whole[:, :r, r:], optimize=True)
-        return np.maximum(np.einsum("gtt->gt", whole[:, :r, :r]) - taken, 0.0), None
+            return remaining.sum(axis=0), axes
+        products = np.einsum("bnt,bns->ts", both, both) - np.einsum("bgpt,bgps->gts", along, along, optimize=True)
+        inner = np.linalg.pinv(products[:, r:, r:], rcond=_JITTER, hermitian=True)
+        taken = np.einsum("gtq,gqs,gts->gt", products[:, :r, r:], inner, products[:, :r, r:], optimize=True)
+        return np.maximum(np.einsum("gtt->gt", products[:, :r, :r]) - taken, 0.0), None
 
 
 def _value(values: Values, parameter: Nonlinear, axis: int | None) -> float:

@@ -50,7 +50,7 @@ def _placed(space: Space, problem: Problem, term: Term) -> Term:
     """An alternative at the best dwell near its own."""
     if not isinstance(term.effect, Handling):
         return term
-    near = term.effect.near(problem.lot, **term.place)
+    near = term.effect.near(problem.lot, **term.location)
     if len(near) < 2:
         return term
     pieces = list(problem.pieces(term.effect, near))
@@ -99,7 +99,7 @@ def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear
 
 
 def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
-    """The same for every axis by itself, if the axes differ by more than noise."""
+    """The term with a value of the parameter for each axis, if the axes differ by more than noise; else as it is."""
     if problem.per_unit < len(ALL_AXES):
         return term
     common = float(_gain(space, problem, term, [term.keywords]).drop[0])
@@ -110,8 +110,8 @@ def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) 
         sets = [{**term.keywords, parameter.name: tuple(each)} for each in values.tolist()]
         by_block = _gain(space, problem, term, sets).by_block
         by_axis = by_block.reshape(-1, 3, len(values)).sum(axis=0)
-        place = np.argmax(by_axis, axis=1)
-        best, taken = values[place, range(3)], by_axis[range(3), place]
+        row = np.argmax(by_axis, axis=1)
+        best, taken = values[row, range(3)], by_axis[range(3), row]
         values = np.stack([around(parameter, on_scale(parameter, float(v)), width) for v in best], axis=1)
         width *= 0.4
     if float(taken.sum()) - common < decisions.AXES_DIFFER * space.variance:
@@ -152,29 +152,29 @@ def _gain(space: Space, problem: Problem, term: Term, sets: Sequence[Values]) ->
     size, start = problem.at_a_time, term.memory and not term.rest
     parts = [sets[first : first + size] for first in range(0, len(sets), size)]
     made = (problem.varied(term.effect, part, first=term.first, start=start) for part in parts)
-    return Gain.joined([space.gain(one) for one in made])
+    return Gain.joined([space.gain(candidate) for candidate in made])
 
 
 def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ...]) -> Term:
     return replace(term, values=tuple({**term.keywords, parameter.name: value}.items()))
 
 
-def _beside(model: Model, terms: Sequence[Term], place: int) -> Model:
+def _beside(model: Model, terms: Sequence[Term], left_out: int) -> Model:
     """A model of all terms but one, at the noise of another model."""
-    return Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
+    return Model(model.problem, [t for k, t in enumerate(terms) if k != left_out], near=model.noise)
 
 
 def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
-    """Terms of a given model, nonlinear parameters estimated one after the other."""
+    """Terms of a given model, with nonlinear parameters estimated effect by effect."""
     terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in effects]
-    for place, effect in enumerate(effects):
+    for index, effect in enumerate(effects):
         grid = grid_of(effect, problem.lot.state)
         if len(grid) < 2:
             continue
-        rest = Model(problem, [t for i, t in enumerate(terms) if i != place])
+        rest = Model(problem, [t for i, t in enumerate(terms) if i != index])
         gain = rest.space.gain(problem.candidate(effect, grid))
         best = Term(effect, tuple(grid[int(np.argmax(gain.drop))].items()))
-        terms[place] = refine(rest, best, rest.noise)
+        terms[index] = refine(rest, best, rest.noise)
     return terms
 
 
@@ -184,15 +184,15 @@ def replaced(model: Model) -> Model:
     Where dwells were left out, all instants of a step between them are equally good; with the dwells back one is best.
     """
     terms = list(model.terms)
-    for place, term in enumerate(model.terms):
+    for index, term in enumerate(model.terms):
         if isinstance(term.effect, Handling):
             continue
         found = [p for p in term.effect.parameters(model.problem.lot.state) if p.choices]
-        rest = _beside(model, terms, place)
+        rest = _beside(model, terms, index)
         for parameter in found:
-            drop = _varied(rest.at(model.noise), model.problem, terms[place], parameter, parameter.grid()).drop
-            best = _with_value(terms[place], parameter, float(parameter.grid()[int(np.argmax(drop))]))
-            terms[place] = _between_choices(rest.at(model.noise), model.problem, best, parameter)
+            drop = _varied(rest.at(model.noise), model.problem, terms[index], parameter, parameter.grid()).drop
+            best = _with_value(terms[index], parameter, float(parameter.grid()[int(np.argmax(drop))]))
+            terms[index] = _between_choices(rest.at(model.noise), model.problem, best, parameter)
     return Model(model.problem, terms, near=model.noise) if terms != list(model.terms) else model
 
 
@@ -201,15 +201,15 @@ def settled(model: Model) -> Model:
 
     A search places each parameter near its grid and at the noise without its term, which is larger: where the residual depends
     on it weakly, the value would differ between a search and a fit of the resulting model. Parameters with one value per axis
-    stay.
+    are left as they are.
     """
     terms = list(model.terms)
-    for place, original in enumerate(model.terms):
+    for index, original in enumerate(model.terms):
         term = original
         for parameter in _continuous(model.problem, original):
-            values, drop = _profile(_beside(model, terms, place).at(model.noise), model.problem, term, parameter)
+            values, drop = _profile(_beside(model, terms, index).at(model.noise), model.problem, term, parameter)
             term = _with_value(term, parameter, float(values[int(np.argmax(drop))]))
-        terms[place] = term
+        terms[index] = term
     return Model(model.problem, terms, near=model.noise) if terms != list(model.terms) else model
 
 
@@ -220,13 +220,13 @@ def intervals(model: Model) -> dict[str, dict[str, tuple[float, float]]]:
     bound of the parameter is open there.
     """
     by_effect: dict[str, dict[str, tuple[float, float]]] = {}
-    for place, term in enumerate(model.terms):
+    for index, term in enumerate(model.terms):
         for parameter in _continuous(model.problem, term):
-            space = _beside(model, model.terms, place).at(model.noise)
+            space = _beside(model, model.terms, index).at(model.noise)
             values, drop = _profile(space, model.problem, term, parameter)
             inside = values[drop >= drop.max() - space.variance]
-            own = by_effect.setdefault(term.effect.id, {})
-            own[parameter.name] = float(inside.min()), float(inside.max())
+            by_parameter = by_effect.setdefault(term.effect.id, {})
+            by_parameter[parameter.name] = float(inside.min()), float(inside.max())
     return by_effect
 
 
@@ -235,20 +235,20 @@ _PLACES = 81
 
 
 def _profile(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> tuple[Array, Array]:
-    """Values of a parameter over its range, closer together around the best and its own, and the reduction of χ² at each."""
+    """Values of a parameter over its range, denser around the best one, with that of the term; the reduction of χ² at each."""
     low, high = sorted((on_scale(parameter, parameter.low), on_scale(parameter, parameter.high)))
-    own = on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
-    coarse = np.append(np.linspace(low, high, _PLACES), own)
+    fitted = on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
+    coarse = np.append(np.linspace(low, high, _PLACES), fitted)
 
-    def drop(places: Array) -> Array:
-        values = np.array([_off_scale(parameter, float(v)) for v in places])
+    def drop(scaled: Array) -> Array:
+        values = np.array([_off_scale(parameter, float(v)) for v in scaled])
         return _varied(space, problem, term, parameter, values).drop
 
     first = drop(coarse)
     centre, cell_ = coarse[int(np.argmax(first))], (high - low) / (_PLACES - 1)
     fine = np.clip(np.linspace(centre - cell_, centre + cell_, _PLACES), low, high)
-    places = np.concatenate([coarse, fine])
-    values = np.array([_off_scale(parameter, float(v)) for v in places])
+    scaled = np.concatenate([coarse, fine])
+    values = np.array([_off_scale(parameter, float(v)) for v in scaled])
     return values, np.concatenate([first, drop(fine)])
 
 

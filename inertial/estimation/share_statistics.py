@@ -70,7 +70,7 @@ class ShareStatistics:
 
     def __init__(self, problem: Problem, local: Array, shared: Array) -> None:
         self.problem, self._local, self._shared = problem, local, shared
-        self._kept: dict[Shares, Array] = {}
+        self._store: dict[Shares, Array] = {}
         self._single: dict[tuple[int, Shares], Array] = {}
 
     @property
@@ -142,33 +142,33 @@ class ShareStatistics:
         """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + q + 1)."""
         blocks = self.problem.blocks
         few: list[Array] = []
-        places: list[Places] = []
+        column_of: list[Places] = []
         count = 0
         for column in np.swapaxes(self._rows, 0, 1):
             rows = shared_rows(column, self.problem.per_unit)
             few.append(column if rows is None else column[np.unique(rows, return_index=True)[1]])
-            places.append(count + (np.arange(blocks) if rows is None else rows))
+            column_of.append(count + (np.arange(blocks) if rows is None else rows))
             count += len(few[-1])
-        return np.concatenate(few), np.stack(places, axis=1)
+        return np.concatenate(few), np.stack(column_of, axis=1)
 
     def _products(self, shares: Shares) -> Array:
         """Products (blocks, r + q + 1, r + q + 1) of the columns and the measurements with each other."""
         common = shares.common
-        if common not in self._kept:
-            self._kept = {common: self._made(common)}  # the last alone: a search for shares seldom goes back
-        products = self._kept[common]
-        if shares.own:
+        if common not in self._store:
+            self._store = {common: self._made(common)}  # the last alone: a search for shares seldom goes back
+        products = self._store[common]
+        if shares.by_block:
             products = products.copy()
-            for block, flicker, walk in shares.own:
+            for block, flicker, walk in shares.by_block:
                 products[block] = self._of_block(block, Shares(flicker, walk))
         return products
 
     def _made(self, shares: Shares) -> Array:
         covariance = self.problem.covariance
-        columns, places = self._distinct
-        out = np.empty((self.problem.blocks, places.shape[1], places.shape[1]))
-        for members, own, rows in covariance.solved(columns, places, shares):
-            each = np.searchsorted(own, places[members])
+        columns, column_of = self._distinct
+        out = np.empty((self.problem.blocks, column_of.shape[1], column_of.shape[1]))
+        for members, distinct, rows in covariance.solved(columns, column_of, shares):
+            each = np.searchsorted(distinct, column_of[members])
             few = max(PIECE // (each.shape[1] * self.problem.n), 1)
             for some in (slice(start, start + few) for start in range(0, members.size, few)):
                 out[members[some]] = rows[each[some]] @ np.swapaxes(self._rows[members[some]], -1, -2)
@@ -177,8 +177,8 @@ class ShareStatistics:
 
     def _of_block(self, block: int, shares: Shares) -> Array:
         """The products of one block, at shares that are its own or the lot's."""
-        if shares in self._kept:
-            return self._kept[shares][block]
+        if shares in self._store:
+            return self._store[shares][block]
         if (block, shares) not in self._single:
             covariance = self.problem.covariance
             made = covariance.whitener_of_block(block, shares).rows(self._rows[block])
@@ -235,7 +235,12 @@ def _factorised(products: Array) -> Left | None:
 
 
 def _beside_common(products: Array, rank: int, scale: Array) -> Left | None:
-    """The same where all blocks share the coefficients of the columns after the first ``rank``; ``scale`` as of ``left``."""
+    """What columns leave of measurements where all blocks share the coefficients of those after the first ``rank``.
+
+    Parameters
+    ----------
+    products : as of :func:`_factorised`; scale : as of ``left``
+    """
     size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
     unit = products / (size[:, :, None] * size[:, None, :])
     inner, across = unit[:, :rank, :rank], unit[:, :rank, rank:]
@@ -244,13 +249,13 @@ def _beside_common(products: Array, rank: int, scale: Array) -> Left | None:
         return None  # some are limited in what they count
     left = unit[:, rank:, rank:] - np.swapaxes(across, -1, -2) @ np.linalg.solve(inner, across)
     left *= size[:, rank:, None] * size[:, None, rank:]
-    whole = np.sum(left / scale[:, None, None] ** 2, axis=0)
+    summed = np.sum(left / scale[:, None, None] ** 2, axis=0)
     before = np.sum((size[:, rank:] / scale[:, None]) ** 2, axis=0)
-    after = np.diagonal(whole)
+    after = np.diagonal(summed)
     if float((after[:-1] / before[:-1]).min(initial=1.0)) < _ABSORBED:
         return None
     root = np.sqrt(after[:-1])
-    gram, right = whole[:-1, :-1] / np.outer(root, root), whole[:-1, -1] / root
+    gram, right = summed[:-1, :-1] / np.outer(root, root), summed[:-1, -1] / root
     if float(np.linalg.eigvalsh(gram).min(initial=1.0)) < _ABSORBED:
         return None
     sizes = np.append(-np.linalg.solve(gram, right) / root, 1.0)

@@ -17,7 +17,7 @@ from inertial.estimation.noise_shares import LONGEST, Shares
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Space
 
-Place = tuple[int | None, int | None]
+LatticePoint = tuple[int | None, int | None]
 
 _STRIDES = (4, 2, 1)
 """Half decades, quarters, eighths."""
@@ -41,18 +41,18 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
 
     Parameters
     ----------
-    near : start; 1/f of three times the white variance if None; blocks that have their own keep them
+    near : start; 1/f of three times the white variance if None; shares of single blocks stay as they are
     finest : smallest stride, in eighths of a decade
     """
-    known: dict[Place, float] = {}
-    own = () if near is None else near.own
+    known: dict[LatticePoint, float] = {}
+    by_block = () if near is None else near.by_block
 
-    def at(place: Place) -> float:
-        if place not in known:
-            known[place] = deviance(shares_at(place, own))
-        return known[place]
+    def at(point: LatticePoint) -> float:
+        if point not in known:
+            known[point] = deviance(shares_at(point, by_block))
+        return known[point]
 
-    here = (4, None) if near is None else place_of(near)
+    here = (4, None) if near is None else nearest_point(near)
     for stride in _STRIDES:
         if stride < finest:
             break
@@ -61,7 +61,7 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
             if best is None:
                 break
             here = best
-    return shares_at(here, own)
+    return shares_at(here, by_block)
 
 
 def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[tuple[Shares, float]]:
@@ -71,22 +71,22 @@ def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[
     half decade. Few dwells leave decades of shares open, and errors that are stated at the best alone are too small.
     """
     stride = _STRIDES[0]
-    middle = place_of(best)
-    known = {middle: deviance(shares_at(middle, best.own))}
+    middle = nearest_point(best)
+    known = {middle: deviance(shares_at(middle, best.by_block))}
     open_, least = [middle], known[middle]
     while open_:
         first, second = open_.pop()
         near = [(k, second) for k in _beside(first, stride, middle[0])]
         near += [(first, k) for k in _beside(second, stride, middle[1])]
-        for place in near:
-            if place not in known and len(known) < _MOST_PLACES:
-                known[place] = deviance(shares_at(place, best.own))
-                if known[place] < least + _RULED_OUT:
-                    least = min(least, known[place])
-                    open_.append(place)
-    kept = {place: np.exp(-0.5 * (value - least)) for place, value in known.items() if value < least + _RULED_OUT}
-    total = sum(kept.values())
-    return [(shares_at(place, best.own), float(weight / total)) for place, weight in kept.items()]
+        for point in near:
+            if point not in known and len(known) < _MOST_PLACES:
+                known[point] = deviance(shares_at(point, best.by_block))
+                if known[point] < least + _RULED_OUT:
+                    least = min(least, known[point])
+                    open_.append(point)
+    weights = {point: np.exp(-0.5 * (value - least)) for point, value in known.items() if value < least + _RULED_OUT}
+    total = sum(weights.values())
+    return [(shares_at(point, best.by_block), float(weight / total)) for point, weight in weights.items()]
 
 
 def _beside(k: int | None, stride: int, middle: int | None) -> list[int | None]:
@@ -97,8 +97,8 @@ def _beside(k: int | None, stride: int, middle: int | None) -> list[int | None]:
     return [k - stride if k - stride >= LEAST_SHARE else None, *([k + stride] if k + stride <= LARGEST_SHARE else [])]
 
 
-def place_of(shares: Shares) -> Place:
-    """The place of the lattice nearest to shares."""
+def nearest_point(shares: Shares) -> LatticePoint:
+    """The point of the lattice nearest to shares."""
     first, second = (
         None if s <= 10.0 ** ((LEAST_SHARE - 4) / SHARE_STEP) else _inside(round(SHARE_STEP * np.log10(s)))
         for s in (shares.flicker, shares.walk)
@@ -106,23 +106,26 @@ def place_of(shares: Shares) -> Place:
     return first, second
 
 
-def shares_at(place: Place, own: tuple[tuple[int, float, float], ...] = ()) -> Shares:
-    """The shares of a place of the lattice, and of blocks that have their own."""
-    flicker, walk = (0.0 if k is None else 10.0 ** (k / SHARE_STEP) for k in place)
-    return Shares(flicker, walk, own)
+def shares_at(point: LatticePoint, by_block: tuple[tuple[int, float, float], ...] = ()) -> Shares:
+    """The shares at a point of the lattice, with those of blocks that have shares of their own."""
+    flicker, walk = (0.0 if k is None else 10.0 ** (k / SHARE_STEP) for k in point)
+    return Shares(flicker, walk, by_block)
 
 
 def _inside(k: int) -> int:
     return min(max(k, LEAST_SHARE), LARGEST_SHARE)
 
 
-def _around(place: Place, stride: int) -> list[Place]:
+def _around(point: LatticePoint, stride: int) -> list[LatticePoint]:
     """Neighbours: each share up or down, one for the other; at the first stride also none, or appearing."""
-    first, second = place
-    near: list[Place] = [*((first, k) for k in _moved(second, stride)), *((k, second) for k in _moved(first, stride))]
+    first, second = point
+    near: list[LatticePoint] = [
+        *((first, k) for k in _moved(second, stride)),
+        *((k, second) for k in _moved(first, stride)),
+    ]
     if first is not None and second is not None:
         ways = ((-stride, stride), (stride, -stride), (-stride, -stride), (stride, stride))
-        near += [(_inside(first + one), _inside(second + other)) for one, other in ways]
+        near += [(_inside(first + flicker_step), _inside(second + walk_step)) for flicker_step, walk_step in ways]
     if stride == _STRIDES[0]:
         near += [(first, None), (None, second)]
         # a new share is visible only if it is as large as the other
@@ -132,7 +135,7 @@ def _around(place: Place, stride: int) -> list[Place]:
         if first is None:
             near += [(LEAST_SHARE + 8, second)]
             near += [] if second is None else [(second, second), (second, _inside(second - 8))]
-    return [p for p in dict.fromkeys(near) if p != place]
+    return [p for p in dict.fromkeys(near) if p != point]
 
 
 def _moved(k: int | None, stride: int) -> list[int]:
@@ -142,7 +145,7 @@ def _moved(k: int | None, stride: int) -> list[int]:
 def own_shares(
     problem: Problem, series: Array, local: Array, space: Space, of_block: Callable[[int, Shares], float | None]
 ) -> tuple[tuple[int, float, float], ...]:
-    """Blocks with shares of their own, and these, for the residuals of a model at the lot's shares.
+    """Blocks with shares of their own, and their shares of 1/f and of walk, from the residuals of a model at the lot's shares.
 
     Parameters
     ----------
@@ -153,11 +156,11 @@ def own_shares(
     """
     if problem.lot.radial or problem.n > LONGEST:
         return ()
-    before = {block for block, _, _ in space.noise.shares.own}
+    before = {block for block, _, _ in space.noise.shares.by_block}
     suspect = before | set(np.flatnonzero(_follow(space) > OWN_SUSPECT).tolist())
     dof = space.by_block
     common = space.noise.shares.common
-    own: list[tuple[int, float, float]] = []
+    by_block: list[tuple[int, float, float]] = []
     for block in sorted(suspect):
         if dof[block] < FEWEST:
             continue
@@ -173,8 +176,8 @@ def own_shares(
 
         best = best_shares(deviance, common, finest=_STRIDES[0])
         if deviance(common) - deviance(best) > OWN_SHARES:
-            own.append((block, best.flicker, best.walk))
-    return tuple(own)
+            by_block.append((block, best.flicker, best.walk))
+    return tuple(by_block)
 
 
 def _follow(space: Space) -> Array:

@@ -15,7 +15,7 @@ FEWEST_SAMPLES = 2 * _LINES + 1
 
 
 def slow_deviation(dwells: Sequence[Array]) -> Array:
-    """Standard deviations (m, k) of white noise that leaves as much in the mean of each of m dwells as is left there.
+    """Standard deviations (m, k) of white noise that scatters the mean of each of m dwells as its slow noise does.
 
     The mean is the line at zero of a dwell's spectrum. The lines next to it hold as much noise, and as much as the mean of what
     leaks from a vibration far above them. The scatter of the samples tells neither: an engine that shakes them averages out, the
@@ -28,8 +28,8 @@ def slow_deviation(dwells: Sequence[Array]) -> Array:
     # a sine and a cosine of each frequency, each with the variance of a sample if the noise is white
     lines = [2.0 / len(x) * np.abs(np.fft.rfft(x - x[0], axis=0)[1 : _LINES + 1]) ** 2 for x in dwells]
     squares = np.stack([line.sum(axis=0) for line in lines])
-    for own in squares.T:
-        moves = own > 0.0  # an output that stays at one digit tells nothing of the others
+    for of_output in squares.T:
+        moves = of_output > 0.0  # an output that stays at one digit tells nothing of the others
         if moves.any():
-            own[moves] = moderated(own[moves], np.full(int(moves.sum()), 2.0 * _LINES))[0]
+            of_output[moves] = moderated(of_output[moves], np.full(int(moves.sum()), 2.0 * _LINES))[0]
     return np.sqrt(squares)

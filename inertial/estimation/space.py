@@ -92,8 +92,8 @@ class Space:
         for some in np.split(np.arange(blocks), range(few, blocks, few)):
             columns = np.concatenate([y[some, :, None], shared[some], local[some]], axis=-1)
             white = covariance.whiten(columns, noise.shares, some) / noise.scale[some, None, None]
-            self.q[some], self.ranks[some], own = basis(white[..., t:])
-            self._log_determinant += own
+            self.q[some], self.ranks[some], log_determinant = basis(white[..., t:])
+            self._log_determinant += log_determinant
             self.targets[some] = self.project(white[..., :t], some)
         self.gram = np.einsum("bnt,bns->ts", self.targets, self.targets)
         self.local_rank = int(self.ranks.sum())
@@ -201,8 +201,8 @@ class Space:
         with_rows = times_rows(self._rows, candidate)
         local = self.q.shape[-1]
         scale = self.noise.scale if candidate.blocks is None else self.noise.scale[candidate.blocks]
-        whole = self.covariance.products(candidate, self.noise.shares) / scale[:, None, None, None] ** 2
-        return Products(whole, with_rows[..., :local], with_rows[..., local:])
+        gram = self.covariance.products(candidate, self.noise.shares) / scale[:, None, None, None] ** 2
+        return Products(gram, with_rows[..., :local], with_rows[..., local:])
 
     def gain(self, candidate: Candidate) -> Gain:
         """Gain of a candidate on the residuals."""
@@ -215,7 +215,7 @@ class Space:
         along = np.swapaxes(vectors, -1, -2) @ (found.inside / size[..., None])
         return self._gain_along(along * inverse_roots(values, SEEN**2)[..., None], values > SEEN**2)
 
-    def gain_of_dwells(self, columns: Array, places: Places) -> Gain:
+    def gain_of_dwells(self, columns: Array, dwells: Places) -> Gain:
         """Gain of columns of one dwell each, for every dwell separately; all blocks share their coefficients.
 
         With P as in :mod:`inertial.criticism.left_out` a column t at dwell k has the product t²·P_kk with itself and t·(Py)_k
@@ -223,23 +223,23 @@ class Space:
 
         Parameters
         ----------
-        columns : (blocks, n, p), of every dwell; places : (grid,), the dwells
+        columns : (blocks, n, p), of every dwell; dwells : (grid,)
         """
         n, p = columns.shape[1:]
-        inside, own = np.zeros((n, p, self.targets.shape[-1])), np.zeros((n, p, p))
+        inside, left = np.zeros((n, p, self.targets.shape[-1])), np.zeros((n, p, p))
         size = np.zeros((n, p))
         for members, whitener in self.covariance.whiteners(self.noise.shares):
             scale = (self.covariance.level * self.noise.scale)[members, None]
             # rows of Pᵀ from the left: the part that the local columns explain is subtracted
             back = np.swapaxes(self.targets[members], -1, -2) @ whitener
             along = np.swapaxes(self.q[members], -1, -2) @ whitener
-            whole = np.sum(whitener**2, axis=0) / scale**2
-            diagonal = np.maximum(whole - np.einsum("brn,brn->bn", along, along) / scale**2, 0.0)
+            precision = np.sum(whitener**2, axis=0) / scale**2
+            diagonal = np.maximum(precision - np.einsum("brn,brn->bn", along, along) / scale**2, 0.0)
             inside += np.einsum("bnp,btn->npt", columns[members], back / scale[..., None])
-            own += np.einsum("bnp,bnr,bn->npr", columns[members], columns[members], diagonal)
-            size += np.einsum("bnp,bn->np", columns[members] ** 2, whole)
+            left += np.einsum("bnp,bnr,bn->npr", columns[members], columns[members], diagonal)
+            size += np.einsum("bnp,bn->np", columns[members] ** 2, precision)
         size = np.sqrt(np.where(size > 0.0, size, 1.0))
-        return self._solved((own / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places])
+        return self._solved((left / size[:, :, None] / size[:, None, :])[dwells], (inside / size[..., None])[dwells])
 
     def _gain_along(self, along: Array, seen: Flags) -> Gain:
         rank = seen.sum(axis=(0, 2))
@@ -261,30 +261,30 @@ class Space:
         inner = np.linalg.pinv(left[:, 1:, 1:] / np.outer(size, size), rcond=1e-8, hermitian=True)
         again = np.einsum("gqp,gp->gq", inner, left[:, 1:, 0] / size) / size
         turned = np.concatenate([np.ones((len(left), 1)), -again], axis=-1)
-        whole = np.einsum("bnt,bns->bts", self.targets, self.targets)
-        after = np.einsum("bts,gt,gs->bg", whole, turned, turned, optimize=True)
+        products = np.einsum("bnt,bns->bts", self.targets, self.targets)
+        after = np.einsum("bts,gt,gs->bg", products, turned, turned, optimize=True)
         after -= np.sum(np.einsum("bgrt,gt->bgr", along, turned) ** 2, axis=-1)
         return np.einsum("bn,bn->b", self.residual, self.residual)[:, None] - after
 
     def _gain_shared(self, found: Products, *, per_unit: int | None) -> Gain:
         """Gain of columns whose coefficients all blocks share, or those of each unit: units in turn, all values of each."""
         together = per_unit or found.whole.shape[0]
-        own, squares, inside = (
+        left, squares, inside = (
             each.reshape(-1, together, *each.shape[1:]).sum(axis=1).reshape(-1, *each.shape[2:])
             for each in (found.left, found.squares, found.inside)
         )
         size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
-        return self._solved(own / (size[:, :, None] * size[:, None, :]), inside / size[..., None])
+        return self._solved(left / (size[:, :, None] * size[:, None, :]), inside / size[..., None])
 
-    def _solved(self, own: Array, inside: Array) -> Gain:
+    def _solved(self, left: Array, inside: Array) -> Gain:
         """Gain from products (grid, p, p) of common columns with each other and (grid, p, t) with the targets."""
         along = inside[..., 0]
         if self.targets.shape[-1] > 1:
             inner = np.linalg.pinv(self.gram[1:, 1:], rcond=1e-10, hermitian=True)
-            own = own - inside[..., 1:] @ inner @ np.swapaxes(inside[..., 1:], -1, -2)
+            left = left - inside[..., 1:] @ inner @ np.swapaxes(inside[..., 1:], -1, -2)
             along = along - inside[..., 1:] @ (inner @ self.gram[1:, 0])
-        values, vectors = eigen(own)
+        values, vectors = eigen(left)
         seen = values > SEEN**2
         onto = np.einsum("gpr,gp->gr", vectors, along)
         drop = np.sum(np.where(seen, onto**2 / np.where(seen, values, 1.0), 0.0), axis=1)
-        return Gain(drop, seen.sum(axis=1), np.zeros((0, len(own))))
+        return Gain(drop, seen.sum(axis=1), np.zeros((0, len(left))))

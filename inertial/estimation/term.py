@@ -48,8 +48,8 @@ class Term:
         return dict(self.values)
 
     @property
-    def place(self) -> dict[str, float]:
-        """The place of a handling error."""
+    def location(self) -> dict[str, float]:
+        """The location of a handling error in the lot: unit, dwell, soak or pose, as of its ``locations``."""
         return {name: value for name, value in self.values if isinstance(value, float)}
 
     def candidate(self, problem: Problem) -> Candidate:
@@ -84,7 +84,7 @@ class TurnOnBias(SensorEffect):
         return stack(state, steps) if steps else np.zeros((*state.time.shape, 0))
 
     def names(self, axis: int) -> tuple[str, ...]:
-        """Its one name."""
+        """Name of the coefficient, equal on all axes."""
         return ("kP",)
 
 

@@ -34,7 +34,7 @@ class DwellProfile:
         return self.profile * self.loudness
 
     def louder(self, kernel: Array) -> Array:
-        """A covariance of wander (n, n), as loud as the dwells."""
+        """A covariance of wander (n, n), scaled by the loudness of the dwells."""
         if not isinstance(self.loudness, np.ndarray):
             return kernel
         return kernel * (self.loudness[:, None] * self.loudness)
@@ -53,7 +53,7 @@ def grouped(
 ) -> tuple[list[DwellProfile], list[tuple[int, int, Places]]]:
     """Profiles of dwells that whiteners are made for, and groups of blocks that have a whitener in common.
 
-    A group is the place of its profile, the steps of the lattice by which its shares are larger than the lot's, and its blocks.
+    A group is the index of its profile, the steps of the lattice by which its shares are larger than the lot's, and its blocks.
 
     Parameters
     ----------
@@ -66,18 +66,18 @@ def grouped(
     groups: dict[tuple[int, int], list[int]] = {}
     for block, there in enumerate(np.isfinite(error)):
         profile = np.where(there, np.where(there, error[block], 1.0) / level[block], 1.0)
-        own = profile[there]
-        if own.size and own.max() < EVEN * own.min():
+        present = profile[there]
+        if present.size and present.max() < EVEN * present.min():
             profile = np.ones_like(profile)
-        place = next((i for i, one in enumerate(profiles) if one.fits(time[block], there, profile)), None)
-        if place is None:
-            place = len(profiles)
+        index = next((i for i, known in enumerate(profiles) if known.fits(time[block], there, profile)), None)
+        if index is None:
+            index = len(profiles)
             way = None if direction is None else direction[block]
             profiles.append(DwellProfile(time[block], there, profile, way, louder))
         # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
         steps = 2 * round(0.5 * SHARE_STEP * np.log10(white / level[block] ** 2))
-        groups.setdefault((place, steps), []).append(block)
-    return profiles, [(place, steps, np.array(blocks)) for (place, steps), blocks in groups.items()]
+        groups.setdefault((index, steps), []).append(block)
+    return profiles, [(index, steps, np.array(blocks)) for (index, steps), blocks in groups.items()]
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Whitener:
         return self.white**2 if self.lower is None else np.einsum("mn,mn->n", self.lower, self.lower)
 
     def rows(self, series: Array, *, overwrite: bool = False) -> Array:
-        """Series (..., n) with white noise; ``overwrite``: the result may take their place."""
+        """Series (..., n) with white noise; ``overwrite``: the result may be written over them."""
         if self.lower is None:
             return np.multiply(series, self.white, out=series if overwrite else None)
         # half of the products, as the matrix is triangular
@@ -152,7 +152,7 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     index : steps of the lattice at which the shares of 1/f and of random walk stand; None for none
     wander : covariances (n, n) of 1/f and of random walk of variance one; None for records too long for them
     """
-    there, whole = dwells.there, bool(dwells.there.all())
+    there, complete = dwells.there, bool(dwells.there.all())
     white = np.where(there, 1.0 / dwells.white, 0.0)
     if wander is None or index == [None, None]:
         return Whitener(there, white, 2.0 * float(np.sum(np.log(dwells.white[there]))))
@@ -161,7 +161,7 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     for i, each in zip(index, wander, strict=True):
         if i is not None:
             covariance += 10.0 ** (i / SHARE_STEP) * dwells.louder(each)
-    if not whole:
+    if not complete:
         covariance = covariance[np.ix_(there, there)]
     # of the transpose, which is in Fortran order: no copy
     upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
@@ -169,7 +169,7 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
         raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
     logdet = 2.0 * float(np.sum(np.log(np.diagonal(upper))))
     lower = _invert(upper, lower=0, overwrite_c=1)[0].T
-    if not whole:
+    if not complete:
         filled = np.zeros((there.size, there.size))
         filled[np.ix_(there, there)] = lower
         lower = filled

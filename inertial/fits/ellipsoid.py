@@ -123,7 +123,7 @@ def _with_wander(problem: "_Sphere", theta: Array, time: Array, error: Array) ->
     for _ in range(_ROUNDS):
         _, force, size = problem.force(theta)
         each = zip(problem.residuals(theta), problem.rows(theta), force / size[..., None], error, strict=True)
-        problem.whiten = np.stack([whitener_of_norms(left, own, way, time, white) for left, own, way, white in each])
+        problem.whiten = np.stack([whitener_of_norms(left, rows, way, time, white) for left, rows, way, white in each])
         theta = problem.solve(theta)
     return theta
 

@@ -54,8 +54,8 @@ class Series:
     z : (..., 3, n), measurements
     profile : (n,), white standard deviation of each dwell, about one
     kernels : covariances (n, n) of the kinds of wander, of variance one
-    missing : (..., n), measurements that a block lacks, whatever stands in their place; None where all have all. A coefficient of
-        its own for each of them takes it out of coefficients, squares and restricted likelihood exactly
+    missing : (..., n), measurements that a block lacks, with any finite value; None where all have all. One further coefficient
+        for each of them takes it out of coefficients, squares and restricted likelihood exactly
     """
 
     def __init__(
@@ -67,12 +67,12 @@ class Series:
         kernels: tuple[Array, ...],
         missing: Flags | None = None,
     ) -> None:
-        self._own = h.shape[-1]
+        self._width = h.shape[-1]
         lacking = 0 if missing is None else np.count_nonzero(missing, axis=-1)[..., None]
         self.dof: Index = np.broadcast_to(h.shape[-2] - h.shape[-1] - lacking, z.shape[:-1]).astype(np.int64)
         self._gaps = missing is not None and bool(missing.any())
         if missing is not None and self._gaps:
-            h = np.concatenate([np.broadcast_to(h, (*z.shape, self._own)), _indicators(missing, z.shape)], axis=-1)
+            h = np.concatenate([np.broadcast_to(h, (*z.shape, self._width)), _indicators(missing, z.shape)], axis=-1)
         scale = np.sqrt(np.mean(h**2, axis=-2, keepdims=True))
         self._scale = np.where(scale > 0.0, scale, 1.0)
         self._h, self._z, self.kernels = h / self._scale, z, kernels
@@ -109,12 +109,12 @@ class Series:
         theta = np.matmul(gain, z[..., None])[..., 0]
         squares = np.sum((z - np.matmul(h, theta[..., None])[..., 0]) ** 2, axis=-1)
         variance, deviance = self._restricted(squares, root, gram, shared_inverse)
-        own = self._own
-        size = self._scale[..., 0, :own]
+        width = self._width
+        size = self._scale[..., 0, :width]
         return Solved(
-            theta=theta[..., :own] / size,
-            inverse=inverse[..., :own, :own] / (size[..., :, None] * size[..., None, :]),
-            gain=(gain[..., :own, :] @ whiten) / size[..., None],
+            theta=theta[..., :width] / size,
+            inverse=inverse[..., :width, :width] / (size[..., :, None] * size[..., None, :]),
+            gain=(gain[..., :width, :] @ whiten) / size[..., None],
             shared=shared / self._size,
             shared_inverse=shared_inverse / np.outer(self._size, self._size),
             squares=squares,
@@ -156,22 +156,22 @@ class Series:
         if coarse[0, 0] - coarse.min() < _CHARGE:
             return 0.0, 0.0
         rows, columns = np.nonzero(coarse - coarse.min() < _FAR)
-        flicker, walk = (_around(shares[places]) for places in (rows, columns))
+        flicker, walk = (_around(shares[points]) for points in (rows, columns))
         deviance = self.deviances(flicker**2, walk**2)
         rows, columns = np.nonzero(deviance - deviance.min() < _FAR)
         flicker, walk = _between(flicker[rows] ** 2), _between(walk[columns] ** 2)
         deviance = self.deviances(flicker**2, walk**2)
         # half of the belief beforehand is that a kind of wander is not there at all
-        belief = np.outer(*(np.where(one > 0.0, 1.0, _FINE - 1.0) for one in (flicker, walk)))
+        belief = np.outer(*(np.where(root > 0.0, 1.0, _FINE - 1.0) for root in (flicker, walk)))
         weight = belief * np.exp(-0.5 * (deviance - deviance.min()))
         weight = weight / weight.sum()
         return float(weight.sum(axis=1) @ flicker**2), float(weight.sum(axis=0) @ walk**2)
 
 
 def _indicators(missing: Flags, shape: tuple[int, ...]) -> Array:
-    """Columns (..., 3, n, k) of one at a gap of the block each, zeros behind them, for k gaps at most in a block."""
-    place = np.cumsum(missing, axis=-1) - 1
-    columns = (place[..., None] == np.arange(int(place.max()) + 1)) & missing[..., None]
+    """Columns (..., 3, n, k), each 1 at one gap of the block; columns of zeros where a block has fewer than k gaps."""
+    gap = np.cumsum(missing, axis=-1) - 1
+    columns = (gap[..., None] == np.arange(int(gap.max()) + 1)) & missing[..., None]
     return np.broadcast_to(columns[..., None, :, :], (*shape, columns.shape[-1])).astype(np.float64)
 
 
@@ -194,7 +194,7 @@ def profiled_deviance(variance: Array | float, dof: int) -> Array:
     """ν·ln s² + ν·(v/s² − 1) of a mean square v of ν degrees of freedom, at the variance s² of the white part that is likeliest.
 
     Measurements are in units of their white standard error, which the scatter of the samples shows: s² is no less than one. Left
-    free, flicker took the white part's place: in 20 lots with B 30 µg its share came out ten thousand times too large, and the
+    free, flicker replaced the white part: in 20 lots with B 30 µg its share came out ten thousand times too large, and the
     fit took part of it for a random walk that was not there.
     """
     likely = np.maximum(variance, 1.0)
@@ -217,7 +217,7 @@ class Restricted:
     """
 
     def __init__(self, h: Array, z: Array, white: Array, kernels: tuple[Array, ...]) -> None:
-        common, own = _common(h)
+        common, by_block = _common(h)
         root: Array = np.linalg.cholesky(white).astype(np.float64)
         turn, triangle = np.linalg.qr(_solved(root, common), mode="complete")
         contrasts = _solved(root, turn[:, common.shape[-1] :], transposed=True).T
@@ -227,10 +227,10 @@ class Restricted:
         # ln|V| + ln|HᵀV⁻¹H| = ln|R·V·Rᵀ| + a constant, with the columns H that are taken out
         self._volume = 2.0 * (_log_sizes(root) + _log_sizes(triangle.astype(np.float64)))
         self.blocks, self.n, p = h.shape
-        self.width = own.shape[-1] + 1
+        self.width = by_block.shape[-1] + 1
         self._dof = self.blocks * (self.n - p)
         # what a plain fit explains is taken off first: the likelihood is the same, and its rounding that of the residuals
-        columns = np.concatenate([own, _left(h, z)[..., None]], axis=-1)
+        columns = np.concatenate([by_block, _left(h, z)[..., None]], axis=-1)
         self._columns = (contrasts @ np.moveaxis(columns, 0, 2).reshape(self.n, -1)).reshape(
             -1, self.width, self.blocks
         )
@@ -241,20 +241,22 @@ class Restricted:
         """Restricted deviance, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
         bases = [self._basis(share) for share in second.tolist()]
         weights = [1.0 / (1.0 + np.outer(first, values)) for values, _, _ in bases]
-        volumes = np.stack([one - np.log(weight).sum(axis=1) for (*_, one), weight in zip(bases, weights, strict=True)])
-        squares, own = np.zeros((2, len(second), len(first)))
+        volumes = np.stack(
+            [volume - np.log(weight).sum(axis=1) for (*_, volume), weight in zip(bases, weights, strict=True)]
+        )
+        squares, log_pivots = np.zeros((2, len(second), len(first)))
         for start in range(0, self.blocks, _PIECE):
             piece = np.ascontiguousarray(self._columns[..., start : start + _PIECE])
             rows = [self._products(piece, turn, weight) for (_, turn, _), weight in zip(bases, weights, strict=True)]
             pivots = self._pivots(rows)
             squares += pivots[-1].sum(axis=-1)
-            own += np.log(pivots[:-1]).sum(axis=(0, -1))
-        return (profiled_deviance(squares / self._dof, self._dof) + self.blocks * volumes + own).T
+            log_pivots += np.log(pivots[:-1]).sum(axis=(0, -1))
+        return (profiled_deviance(squares / self._dof, self._dof) + self.blocks * volumes + log_pivots).T
 
     def _basis(self, share: float) -> tuple[Array, Array, float]:
         """At a share of the second kernel λ (m,) of the first, the turn (m, m) to its vectors, and ln|W + t·K₂|.
 
-        Kept, since the grids of one likelihood share some of their strengths.
+        Stored, since the grids of one likelihood share some of their strengths.
         """
         if share not in self._bases:
             shrink = 1.0 / np.sqrt(1.0 + share * self._second)
@@ -270,8 +272,8 @@ class Restricted:
         # in the order of the lower triangle; picking pairs by index takes six times as long
         for column in range(self.width):
             first = column * (column + 1) // 2
-            own = pairs[:, first : first + column + 1]
-            np.multiply(rotated[:, column : column + 1], rotated[:, : column + 1], out=own)
+            row_pairs = pairs[:, first : first + column + 1]
+            np.multiply(rotated[:, column : column + 1], rotated[:, : column + 1], out=row_pairs)
         return (weight @ pairs.reshape(len(piece), -1)).reshape(len(weight), len(self._i), -1)
 
     def _pivots(self, products: list[Array]) -> Array:
@@ -289,16 +291,16 @@ class Restricted:
 
 def _common(h: Array) -> tuple[Array, Array]:
     """Columns (n, c) that every block has, wherever they stand in it, and the others of each block, (b, n, p − c)."""
-    kept = np.ones((h.shape[0], h.shape[2]), dtype=bool)
+    remaining = np.ones((h.shape[0], h.shape[2]), dtype=bool)
     common: list[Array] = []
     blocks = np.arange(len(h))
     for column in h[0].T:
-        same = np.all(h == column[:, None], axis=1) & kept
+        same = np.all(h == column[:, None], axis=1) & remaining
         if same.any(axis=1).all():
-            kept[blocks, same.argmax(axis=1)] = False
+            remaining[blocks, same.argmax(axis=1)] = False
             common.append(column)
-    own = np.swapaxes(np.swapaxes(h, 1, 2)[kept].reshape(len(h), -1, h.shape[1]), 1, 2)
-    return np.stack(common, axis=1) if common else np.zeros((h.shape[1], 0)), own
+    others = np.swapaxes(np.swapaxes(h, 1, 2)[remaining].reshape(len(h), -1, h.shape[1]), 1, 2)
+    return np.stack(common, axis=1) if common else np.zeros((h.shape[1], 0)), others
 
 
 def _left(h: Array, z: Array) -> Array:

@@ -175,12 +175,12 @@ def felt_force(force: Array, output: Array, theta: Array | None = None, axes: tu
 
 
 def of_every_axis(rows: Array, axes: tuple[int, ...], fill: float = 0.0) -> Array:
-    """Rows (..., m, k) of the axes with an output in their places among three, (..., 3, k); the others hold ``fill``."""
+    """Rows (..., m, k) of the axes with an output at their indices among three, (..., 3, k); the others hold ``fill``."""
     if len(axes) == 3:
         return rows
-    whole = np.full((*rows.shape[:-2], 3, rows.shape[-1]), fill)
-    whole[..., axes, :] = rows
-    return whole
+    of_all = np.full((*rows.shape[:-2], 3, rows.shape[-1]), fill)
+    of_all[..., axes, :] = rows
+    return of_all
 
 
 def own_terms(rows: Array, axes: tuple[int, ...]) -> Array:
@@ -205,8 +205,8 @@ def own_axes(state: State, response: Array) -> State | None:
 
 def axis_rows(response: Array) -> Array:
     """Rows of a response (..., 3, 3) over their diagonal; a model without a scale factor has one of 1."""
-    own = np.diagonal(response, axis1=-2, axis2=-1)
-    rows = np.array(response / np.where(own == 0.0, 1.0, own)[..., :, None])
+    diagonal = np.diagonal(response, axis1=-2, axis2=-1)
+    rows = np.array(response / np.where(diagonal == 0.0, 1.0, diagonal)[..., :, None])
     rows[..., range(3), range(3)] = 1.0
     return rows
 
@@ -215,8 +215,8 @@ def pseudo_inverses(columns: Array) -> Array:
     """Pseudo-inverses (..., p, n) of columns (..., n, p); one serves all units where they have the same columns."""
     many = columns.reshape(-1, *columns.shape[-2:])
     if len(many) > 1 and np.array_equal(many, np.broadcast_to(many[0], many.shape)):
-        one = np.asarray(np.linalg.pinv(many[0], rcond=1e-9), dtype=np.float64)
-        return np.broadcast_to(one, (*columns.shape[:-2], *one.shape))
+        inverse = np.asarray(np.linalg.pinv(many[0], rcond=1e-9), dtype=np.float64)
+        return np.broadcast_to(inverse, (*columns.shape[:-2], *inverse.shape))
     return np.asarray(np.linalg.pinv(columns, rcond=1e-9), dtype=np.float64)
 
 

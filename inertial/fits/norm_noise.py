@@ -51,11 +51,13 @@ def whitener_of_norms(residual: Array, rows: Array, direction: Array, time: Arra
         volume = np.log(np.diagonal(low)).sum() + np.log(np.abs(np.diagonal(triangle))).sum()
         return float((residual.size - rows.shape[1]) * np.log(left @ left) + 2.0 * volume)
 
-    best = min(((deviance((f, w)), (f, w)) for f in _SHARES.tolist() for w in _SHARES.tolist()), key=lambda one: one[0])
+    best = min(
+        ((deviance((f, w)), (f, w)) for f in _SHARES.tolist() for w in _SHARES.tolist()), key=lambda found: found[0]
+    )
     for step in _FINER:
         f, w = best[1]
         near = [(f * a, w * b) for a in (1.0 / step, 1.0, step) for b in (1.0 / step, 1.0, step)]
-        best = min([best, *((deviance(one), one) for one in dict.fromkeys(near))], key=lambda one: one[0])
+        best = min([best, *((deviance(shares), shares) for shares in dict.fromkeys(near))], key=lambda found: found[0])
     return np.asarray(solve_triangular(root(*best[1]), np.eye(time.size), lower=True))
 
 
@@ -75,7 +77,7 @@ def runs_left_out(effects: Sequence[str], temperature: Array | None, direction: 
     mean = np.mean(temperature, axis=1, where=there, keepdims=True)  # no number where one of the temperatures is none
     rise = np.nan_to_num(temperature - mean)[..., None]
     columns = {"bias_temperature": direction, "scale_temperature": direction**2}
-    lacking = [RUN_PER_K[name] * rise * own for name, own in columns.items() if name not in effects]
+    lacking = [RUN_PER_K[name] * rise * column for name, column in columns.items() if name not in effects]
     return np.concatenate([np.zeros((*direction.shape[:2], 0)), *lacking], axis=-1)
 
 
@@ -95,17 +97,17 @@ def thin_whitener(error: Array, columns: Array) -> Array:
     ----------
     error : (units, n), infinite for dwells that are left out; columns : (units, n, k)
     """
-    own = np.where(np.isfinite(error), 1.0 / error, 0.0)[..., None]
-    u, s, _ = np.linalg.svd(own * columns, full_matrices=False)
-    return np.concatenate([own, u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + s[..., None, :] ** 2))], axis=-1)
+    weight = np.where(np.isfinite(error), 1.0 / error, 0.0)[..., None]
+    u, s, _ = np.linalg.svd(weight * columns, full_matrices=False)
+    return np.concatenate([weight, u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + s[..., None, :] ** 2))], axis=-1)
 
 
 def whitened(whiten: Array, columns: Array) -> Array:
     """Columns (..., n, m) with white noise of one variance, by a whitener (..., n, n) or one of :func:`thin_whitener`."""
     if whiten.shape[-1] == whiten.shape[-2]:
         return np.asarray(whiten @ columns)
-    own, along = whiten[..., :1] * columns, whiten[..., 1:]
-    return np.asarray(own - along @ (np.swapaxes(along, -1, -2) @ own))
+    weighted, along = whiten[..., :1] * columns, whiten[..., 1:]
+    return np.asarray(weighted - along @ (np.swapaxes(along, -1, -2) @ weighted))
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ class SolvedNorms:
 
     def of_record(
         self,
-        places: Sequence[int],
+        columns: Sequence[int],
         direction: Array,
         slow: Array,
         share: Array,
@@ -166,12 +168,12 @@ class SolvedNorms:
     ) -> Array:
         """Mean square error (3,), under this noise, of the bias of a fit as that of its record, the mean wander included.
 
-        The bias of one noise's own fit is another quantity than that of another's: at the first dwell, or about the mean. The
-        steps between them are no error of the record.
+        Fits under two noises state two quantities as the bias: that at the first dwell, or about the mean. The steps between
+        them are no error of the record.
 
         Parameters
         ----------
-        places : of the bias of each axis among the coefficients; share : (n,), of each dwell in the mean
+        columns : of the bias of each axis among the coefficients; share : (n,), of each dwell in the mean
         gain : (k, n), of the fit whose bias is stated
         """
         share = share / share.sum()
@@ -181,10 +183,10 @@ class SolvedNorms:
         used = np.any(self.whiten != 0.0, axis=-1)
         root = self.whiten[np.ix_(used, used)]
         squares = np.zeros(3)
-        for axis, place in enumerate(places):
+        for axis, column in enumerate(columns):
             # the norm of a dwell shows the wander of an axis as far as the force points along it
-            shown = -gain[place] @ (direction * common[:, None])
-            noise = solve_triangular(root.T, gain[place, used])
+            shown = -gain[column] @ (direction * common[:, None])
+            noise = solve_triangular(root.T, gain[column, used])
             square = (
                 float(noise @ noise)
                 - 2.0 * float(response[axis] @ shown)

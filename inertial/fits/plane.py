@@ -122,11 +122,11 @@ def fit_plane(output: Array, force: Array, across: int, time: Array, error: Arra
     scale = _typical(output, seen, (i, j))
     solved = [_solved(columns, output[:, axis], np.ones((len(seen), 1)), time, error[:, axis]) for axis in range(3)]
     angle = np.arctan2(seen[:, 0], seen[:, 1])
-    values = np.array([one.value for one in solved])
-    errors = np.array([one.error for one in solved])
-    each = np.array([_harmonics(one, angle, (2, 3)) for one in solved])
+    values = np.array([line.value for line in solved])
+    errors = np.array([line.error for line in solved])
+    each = np.array([_harmonics(line, angle, (2, 3)) for line in solved])
     p = float(np.minimum(1.0, 3.0 * each.min()))  # a nan stays one, which min() of Python turns into 1
-    left = np.stack([one.left for one in solved], axis=1) / scale
+    left = np.stack([line.left for line in solved], axis=1) / scale
     return PlaneFit(
         across, (i, j), values[:, 0], errors[:, 0], values[:, 1:], errors[:, 1:], seen, left, len(seen) - 3, p
     )

@@ -51,13 +51,13 @@ class Combined:
     """A fit with its prior.
 
     coefficients, covariance : as in the fit
-    kept : (units, m, p, p), derivative of the coefficients by those of the fit alone
+    of_fit : (units, m, p, p), derivative of the coefficients by those of the fit alone
     share : (units, m, p), share of the prior in the variance of every coefficient
     """
 
     coefficients: Array
     covariance: Array
-    kept: Array
+    of_fit: Array
     share: Array
 
 
@@ -83,8 +83,8 @@ def judged(
     """
     shape = covariance.shape
     mean, within, between = (
-        np.array(np.broadcast_to(one, over))
-        for one, over in ((family.mean, shape[:-1]), (family.within, shape), (family.between, shape))
+        np.array(np.broadcast_to(moment, over))
+        for moment, over in ((family.mean, shape[:-1]), (family.within, shape), (family.between, shape))
     )
     for k, unit in enumerate(units):
         if unit in family.own:
@@ -108,10 +108,10 @@ def judged(
     wider = np.ones((2, len(effects)))
     for name, factor in zip(names, factors, strict=True):
         wider[:, columns[name]] = np.sqrt(factor)[:, None]
-    whole = within * np.outer(wider[0], wider[0]) + between * np.outer(wider[1], wider[1])
-    precision = np.where(foreign[:, None, None, None], 0.0, np.linalg.inv(whole))
+    prior_covariance = within * np.outer(wider[0], wider[0]) + between * np.outer(wider[1], wider[1])
+    precision = np.where(foreign[:, None, None, None], 0.0, np.linalg.inv(prior_covariance))
     widened = {name: factor for name, factor in zip(names, factors, strict=True) if max(factor) > 1.0}
-    return Prior(family, mean, whole, precision, p_unit, widened)
+    return Prior(family, mean, prior_covariance, precision, p_unit, widened)
 
 
 class _Part:

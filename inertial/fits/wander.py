@@ -32,7 +32,7 @@ _FLICKER, _HALVINGS = 1e4, 24
 """Largest share of flicker over the white variance that is looked at, and steps to find the one that explains the scatter."""
 
 _KEPT_TIMES = 400
-"""Dwells up to which kernels are kept: each has the square of their number."""
+"""Dwells up to which kernels are stored: each has the square of their number."""
 
 _COMMON = 2.0
 """Variance of the common residual over that of the units' noise, from which on the noise is looked for without it."""
@@ -89,8 +89,8 @@ class WanderFit:
 def wander_kernels(time: Array, used: Flags | None = None) -> tuple[Array, Array]:
     """Covariances (n, n) of 1/f wander and random walk of variance one at times (n,), s.
 
-    Wander slower than the record is, for the record, the bias itself. Those of a short record are kept, because fit and budget of
-    a lot need the same ones. The walk is counted from its mean over the dwells that are used.
+    Wander slower than the record is, for the record, the bias itself. Kernels of a short record are stored, because fit and
+    budget of a lot need the same ones. The walk is counted from its mean over the dwells that are used.
     """
     there = np.ones(time.size, dtype=bool) if used is None else used
     if time.size > _KEPT_TIMES:
@@ -174,25 +174,25 @@ def fit_lot_with_wander(  # noqa: PLR0913 - what a fit needs, and what of it is 
     inside = np.einsum("...np,...p->...n", columns.local, theta) + columns.shared[..., : columns.station] @ station
     wide = np.sqrt(solved.variance * stretch)[..., None] * level
     known = _known(series, shares, solved)
-    own = _covariance(shared[..., there, :], solved) * (known * wide[..., None]) ** 2
+    theta_covariance = _covariance(shared[..., there, :], solved) * (known * wide[..., None]) ** 2
     apart = _apart(((z - inside) / level)[..., there], gaps)
     if apart is not None:
         alone = Series(columns.local[..., there, :], shared[..., there, :0], apart, profile[there], cut, gaps)
         alone.sound = series.sound
-        own = own * _widening(alone, solved.gain, own / level[..., None] ** 2)
+        theta_covariance = theta_covariance * _widening(alone, solved.gain, theta_covariance / level[..., None] ** 2)
     of_prior = None
     if believed is not None:
-        both = believed(theta, own)
+        both = believed(theta, theta_covariance)
         inside = inside + np.einsum("...np,...p->...n", columns.local, both.coefficients - theta)
-        kept, back = both.kept, np.swapaxes(both.kept, -1, -2)
-        rest = (both.covariance - kept @ own @ back) / (known * wide[..., None]) ** 2
-        solved = replace(solved, gain=kept @ solved.gain, inverse=kept @ solved.inverse @ back + rest)
-        theta, own, of_prior = both.coefficients, both.covariance, both.share
+        of_fit, back = both.of_fit, np.swapaxes(both.of_fit, -1, -2)
+        rest = (both.covariance - of_fit @ theta_covariance @ back) / (known * wide[..., None]) ** 2
+        solved = replace(solved, gain=of_fit @ solved.gain, inverse=of_fit @ solved.inverse @ back + rest)
+        theta, theta_covariance, of_prior = both.coefficients, both.covariance, both.share
     left = _ResidualCovariance(columns.local, shared, solved, covariance, there)
     weighted = replace(
         plain,
         coefficients=theta,
-        covariance=own,
+        covariance=theta_covariance,
         shared=station,
         shared_covariance=known**2 * solved.variance * solved.shared_inverse[: columns.station, : columns.station],
         residuals=np.swapaxes(z - inside, -1, -2),
@@ -248,14 +248,14 @@ def _widening(alone: Series, gain: Array, covariance: Array) -> Array:
 
 def lack_of_fit(chi2: Array, dof: Index | int) -> Array:
     """Birge ratio squared of every block, where its scatter is more than noise of the lot's size makes; one elsewhere."""
-    far = _quantiles(lambda one: _exceeded(_LACKING / chi2.size, one), dof)
+    far = _quantiles(lambda degrees: _exceeded(_LACKING / chi2.size, degrees), dof)
     return np.where(chi2 <= far, 1.0, chi2 / dof)  # what is no number stays none
 
 
 def _quantiles(of: Callable[[int], float], dof: Index | int) -> Array:
     """A number of the χ² of each block; most blocks have equal degrees of freedom."""
     every, where = np.unique(dof, return_inverse=True)
-    return np.array([of(one) for one in every.tolist()])[where].reshape(np.shape(dof))
+    return np.array([of(degrees) for degrees in every.tolist()])[where].reshape(np.shape(dof))
 
 
 def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
@@ -264,7 +264,7 @@ def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
     The scatter of the samples is a lower bound: where less than it is left, the fit is the weighted one.
     """
     shares, solved = _prudent(series, series.best_shares())
-    middle = np.median(solved.squares / _quantiles(lambda one: float(chi2_quantile(0.5, one)), series.dof))
+    middle = np.median(solved.squares / _quantiles(lambda degrees: float(chi2_quantile(0.5, degrees)), series.dof))
     lacking = lack_of_fit(solved.squares / middle, series.dof) > 1.0
     if lacking.any() and not lacking.all():
         series.sound = ~lacking
@@ -314,7 +314,7 @@ def _exceeded(probability: float, dof: int) -> float:
 
 
 def _known(series: Series, shares: tuple[float, float], solved: Solved) -> float:
-    """What errors are widened by where the noise is known from the scatter of a few dwells; one where the samples give it."""
+    """Factor of the errors where the noise is known from the scatter of a few dwells; one where the samples give it."""
     if not any(shares) and not _scattered(series, solved):
         return 1.0
     return student(int(series.dof[series.sound].sum()) - solved.shared.size)

@@ -30,7 +30,7 @@ class LotColumns:
         shared = self._shared(plain.nonlinear)
         self.station = 0 if shared is None else shared.shape[-1]
         self._free = self._parameters(given)
-        slopes = [self._slope(*one) for one in self._free]
+        slopes = [self._slope(*parameter) for parameter in self._free]
         parts = [np.broadcast_to(part, (*shape, part.shape[-1])) for part in ([] if shared is None else [shared])]
         parts += [np.broadcast_to(slope, shape)[..., None] for slope in slopes]
         self.shared = np.concatenate(parts, axis=-1) if parts else np.zeros((*shape, 0))
@@ -70,9 +70,9 @@ class LotColumns:
         """Standard errors of the nonlinear parameters that were given; the largest where axes differ."""
         spread = np.sqrt(solved.variance * np.diagonal(solved.shared_inverse))[self.station :]
         largest: dict[str, dict[str, float]] = {}
-        for (effect, name, _), one in zip(self._free, spread.tolist(), strict=True):
-            own = largest.setdefault(effect, {})
-            own[name] = max(own.get(name, 0.0), self._within_bounds(effect, name, one))
+        for (effect, name, _), error in zip(self._free, spread.tolist(), strict=True):
+            of_effect = largest.setdefault(effect, {})
+            of_effect[name] = max(of_effect.get(name, 0.0), self._within_bounds(effect, name, error))
         return largest
 
     def _within_bounds(self, effect: str, name: str, error: float) -> float:
@@ -80,7 +80,12 @@ class LotColumns:
 
         Where the path takes up that state before the first dwell, the column is zero and its inverse, too: nothing is known.
         """
-        every = (p for one in (*self._sensor, *self._station) if one.id == effect for p in one.parameters(self._state))
+        every = (
+            p
+            for model_effect in (*self._sensor, *self._station)
+            if model_effect.id == effect
+            for p in model_effect.parameters(self._state)
+        )
         parameter = next(p for p in every if p.name == name)
         if not parameter.of_run:
             return error

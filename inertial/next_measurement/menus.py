@@ -61,7 +61,7 @@ class StepSequence:
     steps: tuple[SequenceStep, ...]
 
     def times(self, repeats: int) -> "StepSequence":
-        """The same so many times in a row."""
+        """The sequence repeated so many times."""
         return StepSequence(self.kind, self.steps * repeats)
 
 
@@ -177,7 +177,7 @@ def _approaches(state: State, reach: TableReach, here: float, chosen: Sequence[S
 
 
 def _laters(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """The same poses again and again, with waiting time in between."""
+    """Chosen steps again, once or several times, each after waiting."""
     sequences: list[StepSequence] = []
     for wait, times in ((120.0, 3), (600.0, 1), (600.0, 3), (1800.0, 1), (1800.0, 2)):
         group = [replace(chosen[0], wait=wait), *chosen[1:], chosen[0]]

@@ -111,7 +111,7 @@ class Apart:
     """The separation of rivals.
 
     left : (r, r), chi-square over the whole lot that the rival of a column leaves of what the rival of a row predicts
-    whole : (r,), the same that the model without any of them leaves
+    whole : (r,), what the model without any of them leaves
     """
 
     left: Array
@@ -157,8 +157,8 @@ def predictions(rivals: Rivals, problem: Problem) -> Array:
     contributions: list[Array] = []
     for term, coefficients in zip(rivals.terms, rivals.predicted, strict=True):
         columns = term.columns(problem)
-        own = np.einsum("bnp,bp->bn", columns, np.broadcast_to(coefficients, (columns.shape[0], columns.shape[-1])))
-        contributions.append(own)
+        series = np.einsum("bnp,bp->bn", columns, np.broadcast_to(coefficients, (columns.shape[0], columns.shape[-1])))
+        contributions.append(series)
     return np.stack(contributions, axis=-1)
 
 

@@ -97,15 +97,15 @@ class Offers:
     def _per_minute(self, gain: float, minutes: float) -> float:
         return gain / (minutes - self.spent + 1.0)  # a minute for the start of the follow-up
 
-    def _offer(self, place: int) -> Offer | None:
+    def _offer(self, index: int) -> Offer | None:
         """The sequence with what it brings; None if that is too little."""
-        if place not in self._judged:
-            course, minutes = self.open[place]
+        if index not in self._judged:
+            course, minutes = self.open[index]
             worth = self.search.share([*self.chosen, course])
             gain, least = worth - self.now, min(self.search.least, 0.5 * (1.0 - self.now))
             offer = Offer(course, worth, minutes, self._per_minute(gain, minutes)) if gain >= least else None
-            self._judged[place] = offer
-        return self._judged[place]
+            self._judged[index] = offer
+        return self._judged[index]
 
     def by_kind(self) -> Iterator[Offer]:
         """The best of each kind by gain per minute, the best first."""
@@ -115,9 +115,9 @@ class Offers:
         given: set[Kind] = set()
         while waiting or ready:
             if waiting and (not ready or bound[waiting[0]] >= -ready[0][0]):
-                place = waiting.pop(0)
-                if self.open[place][0].kind not in given and (offer := self._offer(place)) is not None:
-                    heapq.heappush(ready, (-offer.rate, place, offer))
+                index = waiting.pop(0)
+                if self.open[index][0].kind not in given and (offer := self._offer(index)) is not None:
+                    heapq.heappush(ready, (-offer.rate, index, offer))
                 continue
             offer = heapq.heappop(ready)[2]
             if offer.course.kind not in given:
@@ -125,11 +125,11 @@ class Offers:
                 yield offer
 
     def shortest(self, worth: float, below: float) -> Offer | None:
-        """The shortest of the sequences that alone reach a share of the aim in less than some minutes; None without one."""
-        for place in sorted(range(len(self.open)), key=lambda k: self.open[k][1]):
-            if self.open[place][1] >= below:
+        """The shortest sequence that alone reaches a share of the aim in less than some minutes; None if none does."""
+        for index in sorted(range(len(self.open)), key=lambda k: self.open[k][1]):
+            if self.open[index][1] >= below:
                 return None
-            offer = self._offer(place)
+            offer = self._offer(index)
             if offer is not None and offer.worth >= worth:
                 return offer
         return None
@@ -166,7 +166,7 @@ class ProposalSearch:
                 break
             offers = Offers(self, chosen, now)
             singles = singles or offers
-            taken = self._kept(chosen, offers, now)
+            taken = self._confirmed(chosen, offers, now)
             if taken is None:
                 break
             chosen, now = [*chosen, taken[0].course], taken[1]
@@ -177,16 +177,16 @@ class ProposalSearch:
             if not within or promised - now < min(self.aim.least, 0.5 * (1.0 - now)):
                 break
             chosen, now = [*chosen, chosen[0]], promised
-        whole = None
+        sufficient = None
         if singles is not None:
-            whole = singles.shortest(_ALL, below=self.minutes(chosen) if now >= _ALL else float("inf"))
-        if whole is not None:
-            promised = self.share([whole.course], fine=True)
+            sufficient = singles.shortest(_ALL, below=self.minutes(chosen) if now >= _ALL else float("inf"))
+        if sufficient is not None:
+            promised = self.share([sufficient.course], fine=True)
             if promised >= min(now, _ALL):
-                chosen, now = [whole.course], promised
+                chosen, now = [sufficient.course], promised
         return self._proposal(chosen, now) if chosen else None
 
-    def _kept(self, chosen: Sequence[StepSequence], offers: Offers, now: float) -> tuple[Offer, float] | None:
+    def _confirmed(self, chosen: Sequence[StepSequence], offers: Offers, now: float) -> tuple[Offer, float] | None:
         """The offer with the largest gain per minute whose gain remains when every rival is fitted, and the share after it.
 
         On the grid alone the wrong rivals seem more distant than they are: an offer is judged with every rival fitted, the best

@@ -20,7 +20,7 @@ from inertial.noise.gauss_markov import BiasModel, StepOfProcess, step_of_proces
 
 AXES = 3
 GATE_SIGMA = 5.0
-_MOST_STEPS = 64  # of different lengths whose transitions are kept
+_MOST_STEPS = 64  # of different lengths whose transitions are stored
 _FEWEST = 8  # updates that are needed to judge their consistency
 
 
@@ -146,7 +146,7 @@ def first_covariances(model: BiasModel) -> Array:
     parts = model.sd.shape[1] + 1
     first = np.concatenate([model.sd**2, model.turn_on[:, None] ** 2], axis=1)
     into = np.vstack([np.eye(parts), np.ones(parts)])
-    return np.stack([into @ np.diag(own) @ into.T for own in first])
+    return np.stack([into @ np.diag(variances) @ into.T for variances in first])
 
 
 def transitions_by_axis(model: BiasModel, seconds: float, *, mean: bool) -> tuple[Array, Array]:
@@ -165,10 +165,10 @@ def _axis_step(parts: list[StepOfProcess]) -> tuple[Array, Array]:
     """Transition (w, w) and added covariance (w, w) of the state of one axis: its parts, then their common mean."""
     k = len(parts)
     phi, grown = np.zeros((k + 1, k + 1)), np.zeros((k + 1, k + 1))
-    for place, part in enumerate(parts):
-        phi[place, place], phi[k, place] = part.keep, part.weight
-        grown[place, place] = part.end_variance
-        grown[place, k] = grown[k, place] = part.covariance
+    for index, part in enumerate(parts):
+        phi[index, index], phi[k, index] = part.keep, part.weight
+        grown[index, index] = part.end_variance
+        grown[index, k] = grown[k, index] = part.covariance
     grown[k, k] = sum(part.mean_variance for part in parts)
     return phi, grown
 
@@ -219,7 +219,7 @@ def consistency(innovations: list[tuple[int, float]]) -> Consistency:
 class Track:
     """Bias (n, 3) in g after each step, a mean over the step, its covariance (n, 3, 3) in g², and which steps updated it (n,).
 
-    expected, expected_covariance : the same before the update of the step, as known to a filter in real time
+    expected, expected_covariance : the estimate before the update of the step, as known to a filter in real time
     """
 
     bias: Array
@@ -249,7 +249,7 @@ def track(
     force : (n, 3), g, corrected output, means over steps of ``seconds``
     known : (n, 3), g, true force; NaN where it is not known
     magnitude : (n,), g, its magnitude where that alone is known; NaN elsewhere
-    begin : a state to go on with, and its time, s: the middle of the step after which it was kept
+    begin : a state to go on with, and its time, s: the middle of the step after which it was stored
     """
     tracker = BiasFilter(model, begin=None if begin is None else begin[0])
     n = len(time)

@@ -53,21 +53,21 @@ def summed(gap: Array, constants: Array, duration: float = 0.0) -> Array:
             total += fade
         return total
     # two means of one dwell are the same mean; between dwells, the fade between the end of one and the start of the other
-    late, own = np.maximum(gap - duration, 0.0), 0.0
+    late, within = np.maximum(gap - duration, 0.0), 0.0
     for tau, fade in zip(constants, _fading(late, constants), strict=True):
         share = tau / duration
         inside = -np.expm1(-1.0 / share)
-        own += 2.0 * share * (1.0 - share * inside)
+        within += 2.0 * share * (1.0 - share * inside)
         total += (share * inside) ** 2 * fade
-    return np.where(gap > 0.5 * duration, total, own)
+    return np.where(gap > 0.5 * duration, total, within)
 
 
 def _fading(gap: Array, constants: Array) -> Iterator[Array]:
     """e^(−gap/τ) (...), for each time constant in turn."""
     halving = constants.size > 1 and np.array_equal(constants[:-1], 2.0 * constants[1:])
     fade = np.exp(-gap / constants[0]) if constants.size else gap
-    for place, tau in enumerate(constants):
-        if place:  # of half the time constant it is the square
+    for index, tau in enumerate(constants):
+        if index:  # of half the time constant it is the square
             fade = fade * fade if halving else np.exp(-gap / tau)
         yield fade
 

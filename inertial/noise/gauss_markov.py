@@ -48,7 +48,7 @@ class StepOfProcess:
     covariance: float
 
     def at_end(self) -> "StepOfProcess":
-        """The same step, the value at its end in place of the mean."""
+        """The step with the value at its end instead of the mean."""
         return StepOfProcess(self.keep, self.keep, self.end_variance, self.end_variance, self.end_variance)
 
 

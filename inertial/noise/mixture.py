@@ -31,7 +31,7 @@ def basis(m: Index) -> Array:
 
 @lru_cache(maxsize=64)
 def _basis(times: bytes) -> Array:
-    """The same for the bytes of averaging times; not to be written to."""
+    """The array of :func:`basis`, read-only, for the bytes of the averaging times (t,)."""
     tau = np.frombuffer(times)
     columns = np.stack(
         [3.0 / tau**2, 1.0 / tau, np.full_like(tau, 2.0 * np.log(2.0) / np.pi), tau / 3.0, tau**2 / 2.0], 1
@@ -132,10 +132,10 @@ class MixtureFit:
         held = strengths[~free]
         if held.any():
             right_side = right_side - rows[:, ~free] @ held
-        own = rows[:, free]
-        size = np.sqrt(np.sum(own * own, axis=0))
+        columns = rows[:, free]
+        size = np.sqrt(np.sum(columns * columns, axis=0))
         trial = strengths.copy()
-        trial[free] = nnls(own / size, right_side)[0] / size
+        trial[free] = nnls(columns / size, right_side)[0] / size
         return trial
 
 

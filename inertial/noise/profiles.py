@@ -24,7 +24,7 @@ _NEGLIGIBLE = 1e-6
 _WIDEST = 40.0  # natural logarithm: how far above a strength its upper limit is looked for
 _RESOLUTION = 2e-3  # of an end of an interval, relative
 _STEP = 0.7  # of the natural logarithm, on the way to a lower end
-_ROUGH = 0.02  # the same where each look takes the covariance anew
+_ROUGH = 0.02  # the resolution where each look takes the covariance anew
 
 
 class TermFit(NamedTuple):
@@ -53,25 +53,27 @@ def fit_terms(variance: Array, moments: Sums, threshold: float, only: str = "") 
     start = mixture.first_guess(variance, moments)
     while True:
         task, strengths, best = mixture.settled(variance, moments, allowed, np.where(allowed, start, 0.0))
-        kept, reduced, cost = _needed(task, strengths, best, allowed)
-        worth = {j: curve.worth(j) / bars[j] for j in np.flatnonzero(kept).tolist() if j != n} if kept.sum() > 1 else {}
+        needed, reduced, cost = _needed(task, strengths, best, allowed)
+        worth = (
+            {j: curve.worth(j) / bars[j] for j in np.flatnonzero(needed).tolist() if j != n} if needed.sum() > 1 else {}
+        )
         doubtful = [j for j in worth if not worth[j] > 1.0]
         if not doubtful:
             break
         allowed[min(doubtful, key=lambda j: worth[j])] = False
-    task, strengths, best = mixture.settled(variance, moments, np.ones_like(kept), np.where(kept, reduced, 0.0))
-    low, high = np.zeros(kept.size), np.zeros(kept.size)
-    for j in [mixture.TERMS.index(only)] if only else range(kept.size):
-        if kept[j]:
+    task, strengths, best = mixture.settled(variance, moments, np.ones_like(needed), np.where(needed, reduced, 0.0))
+    low, high = np.zeros(needed.size), np.zeros(needed.size)
+    for j in [mixture.TERMS.index(only)] if only else range(needed.size):
+        if needed[j]:
             low[j], high[j] = _profile(task, strengths, best, j, threshold)
             low[j] = low[j] if low[j] > 0.0 else curve.low_end(j, float(reduced[j]), threshold)
         else:
             high[j] = _profile(task, strengths, best, j, _ONE_SIDED_95)[1]
-    if not kept[k] and only in {"", "K"}:
-        high[k] = max(high[k], _walk_limit(variance, moments, np.where(kept, reduced, 0.0)))
-    value = np.where(kept, reduced, np.nan)
-    low = np.fmin(low, np.where(kept, reduced, 0.0))
-    dof = float(variance.size - int(kept.sum()))
+    if not needed[k] and only in {"", "K"}:
+        high[k] = max(high[k], _walk_limit(variance, moments, np.where(needed, reduced, 0.0)))
+    value = np.where(needed, reduced, np.nan)
+    low = np.fmin(low, np.where(needed, reduced, 0.0))
+    dof = float(variance.size - int(needed.sum()))
     return TermFit(value, low, np.fmax(high, np.nan_to_num(value)), curve.strengths, cost, dof)
 
 
@@ -88,8 +90,8 @@ def _walk_limit(variance: Array, moments: Sums, fitted: Array) -> float:
     spread = np.diagonal(moments.covariance(alone[:4], alone[4]))
     edf = np.maximum(2.0 * model[:, k] ** 2 / spread, 1.0)
     rise = edf / chi2_quantile(0.05, edf) / model[:, k]
-    place = int(np.argmin((model @ fitted) * rise))
-    return float(variance[place] * rise[place])
+    lowest = int(np.argmin((model @ fitted) * rise))
+    return float(variance[lowest] * rise[lowest])
 
 
 class _Curve:
@@ -104,7 +106,7 @@ class _Curve:
         first = mixture.first_guess(variance, moments)
         seeds = [first, *(np.where(np.arange(first.size) == k, 0.0, first) for k in (2, 3, 4) if first[k] > 0.0)]
         tried = [mixture.deviance(variance, moments, everything, self._seeded(seed)) for seed in seeds]
-        self.best, self.strengths = min(tried, key=lambda one: one[0])
+        self.best, self.strengths = min(tried, key=lambda fit: fit[0])
 
     def _seeded(self, start: Array) -> Array:
         return start if np.any(start > 0.0) else 0.3 * self._ceiling
@@ -142,12 +144,12 @@ class _Curve:
 
 def _needed(task: MixtureFit, strengths: Array, best: float, allowed: Flags) -> tuple[Flags, Array, float]:
     """Terms that stay after dropping, one by one, the one whose loss costs least, while that is little."""
-    kept = (strengths > 0.0) & allowed
-    current, cost = np.where(kept, strengths, 0.0), best
-    while kept.sum() > 1:
+    needed = (strengths > 0.0) & allowed
+    current, cost = np.where(needed, strengths, 0.0), best
+    while needed.sum() > 1:
         trials: list[tuple[float, int, Array]] = []
-        for j in np.flatnonzero(kept).tolist():
-            fewer = kept.copy()
+        for j in np.flatnonzero(needed).tolist():
+            fewer = needed.copy()
             fewer[j] = False
             start = np.where(fewer, np.maximum(current, 1e-9 * current.max()), 0.0)
             fitted, worse = task.solve(fewer, start)
@@ -155,8 +157,8 @@ def _needed(task: MixtureFit, strengths: Array, best: float, allowed: Flags) -> 
         worse, j, fitted = min(trials, key=lambda trial: trial[0])
         if worse - cost > _KEPT_AT:
             break
-        kept[j], current, cost = False, fitted, worse
-    return kept, current, cost
+        needed[j], current, cost = False, fitted, worse
+    return needed, current, cost
 
 
 def _profile(task: MixtureFit, strengths: Array, best: float, j: int, threshold: float) -> tuple[float, float]:

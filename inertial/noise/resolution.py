@@ -28,8 +28,8 @@ def without_rounding(variance: Array, step: Array) -> Array:
 def ripple(spread: Array, step: Array) -> Array:
     """Largest part of the variance after rounding that Sheppard's correction leaves, by where the mean lies between two digits.
 
-    The first harmonic of the variance over the place of the mean, for normal noise of the standard deviation σ before
-    rounding, has the amplitude (4σ² + q²/π²)·exp(−2π²σ²/q²) (Widrow 1956).
+    The first harmonic of the variance over the position of the mean between two digits, for normal noise of the standard
+    deviation σ before rounding, has the amplitude (4σ² + q²/π²)·exp(−2π²σ²/q²) (Widrow 1956).
 
     Parameters
     ----------

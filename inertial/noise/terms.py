@@ -1,6 +1,6 @@
 """Noise coefficients Q, N, B, K, R under an Allan curve, fitted together, each with an interval or an upper limit.
 
-For a filter, a term that the curve does not identify has its likeliest strength. An upper limit in place of a value is right
+For a filter, a term that the curve does not identify has its likeliest strength. An upper limit instead of a value is right
 where somebody asks how large a term may be. In a filter it is not: the limits of N, B and K cannot hold all at once, and the
 limit of K from a record of half an hour is ten times the usual K, so that a filter stated five times the true deviation after an
 hour without an update.
@@ -184,13 +184,13 @@ def likely_terms(deviation: Array, m: Index, n: int, rate_hz: float) -> LikelyTe
     variance = np.asarray(deviation, dtype=np.float64) ** 2
     walk_at_one = np.exp(np.mean(np.log(variance[:, -_LAST:]), axis=1)) * 3.0 / float(m[-1])
     fits = [
-        [_at(one, moments, share * scale) for share in _SHARES]
-        for one, scale in zip(variance, walk_at_one, strict=True)
+        [_at(curve, moments, share * scale) for share in _SHARES]
+        for curve, scale in zip(variance, walk_at_one, strict=True)
     ]
-    deviances = np.sum([[deviance for deviance, _ in own] for own in fits], axis=0)
+    deviances = np.sum([[deviance for deviance, _ in of_channel] for of_channel in fits], axis=0)
     best = int(np.argmin(deviances))
     best = best if deviances[0] - deviances[best] > _WORTH else 0
-    strengths = np.stack([own[best][1] for own in fits])
+    strengths = np.stack([of_channel[best][1] for of_channel in fits])
     # what the curve cannot tell from no white noise: one standard deviation of its first point
     white = np.maximum(strengths[:, _N], variance[:, 0] * np.sqrt(_SPREAD / n))
     return LikelyTerms(np.sqrt(white / rate_hz), np.sqrt(strengths[:, _B]), np.sqrt(strengths[:, _K] * rate_hz))

@@ -1,6 +1,6 @@
 """T-criterion: how well a plan discriminates between rival effects, from the normal matrix of the model with all of them.
 
-Each rival in turn is taken as the truth, with coefficients of a given size; the model with another rival in its place is fitted
+Each rival in turn is taken as the truth, with coefficients of a given size; the model with another rival instead is fitted
 to the predicted data. The remaining χ² is the noncentrality of the test between the two; a T-optimal plan maximises the
 smallest of them.
 
@@ -57,21 +57,21 @@ class Discrimination:
 
     def objective(self, matrix: Array) -> Array:
         """The function that an exchange minimises: −log of the smallest χ², plus a small weight of the others."""
-        own = -np.log(self.separations(matrix))
-        return own.max(axis=-1) + _OTHERS * own.mean(axis=-1)
+        costs = -np.log(self.separations(matrix))
+        return costs.max(axis=-1) + _OTHERS * costs.mean(axis=-1)
 
     def _remaining_chi_square(self, matrix: Array, true: int, wrong: int) -> Array:
         """χ² (..., axes) of the true rival after a fit of the base model and the wrong rival."""
         of_true, fitted = list(self.rivals[true]), [*self.base, *self.rivals[wrong]]
         size = self.sizes[true]
-        whole = np.einsum("ak,...akl,al->...a", size, matrix[..., of_true, :][..., of_true], size)
+        total = np.einsum("ak,...akl,al->...a", size, matrix[..., of_true, :][..., of_true], size)
         cross = np.einsum("...akl,al->...ak", matrix[..., fitted, :][..., of_true], size)
         scaled, scale = _scaled(matrix[..., fitted, :][..., fitted])
         part = cross / scale
         absorbed = np.einsum(
             "...ak,...ak->...a", part, np.linalg.solve(scaled + _RIDGE * np.eye(len(fitted)), part[..., None])[..., 0]
         )
-        return np.maximum(whole - absorbed, _NEGLIGIBLE * np.maximum(whole, _TINY))
+        return np.maximum(total - absorbed, _NEGLIGIBLE * np.maximum(total, _TINY))
 
 
 def _scaled(matrix: Array) -> tuple[Array, Array]:

@@ -81,10 +81,10 @@ def one_wait(state: State) -> bool:
 
 def never_again(state: State) -> bool:
     """Whether no pose is repeated at the same temperature."""
-    place = np.round(state.force, 3)
+    conditions = np.round(state.force, 3)
     if state.temperature is not None:
-        place = np.concatenate([place, np.round(state.temperature[:, None] / _FLAT_K)], axis=1)
-    return len(np.unique(place, axis=0)) == n_of(state)
+        conditions = np.concatenate([conditions, np.round(state.temperature[:, None] / _FLAT_K)], axis=1)
+    return len(np.unique(conditions, axis=0)) == n_of(state)
 
 
 def far_from_zero(state: State) -> bool:

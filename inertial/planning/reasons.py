@@ -96,20 +96,20 @@ def cause(state: State, effect_id: str, base: Sequence[str], *, axis: int | None
     return Cause(feature, f"{verb} {term} {relation}", result, " and ".join(r.cure(unit) for r in remedies))
 
 
-def confounding_feature(state: State, one: str, other: str, base: Sequence[str]) -> str:
+def confounding_feature(state: State, effect_id: str, other: str, base: Sequence[str]) -> str:
     """The feature of a plan that makes one effect similar to another beside a model, as a clause; empty where there is none."""
     state, fitted = first_unit(state), [*base, other]
     try:
-        fraction = _remaining_fraction(state, one, fitted, None)
+        fraction = _remaining_fraction(state, effect_id, fitted, None)
         if fraction <= visibility.SEEN:
-            hidden = cause(state, one, fitted)
+            hidden = cause(state, effect_id, fitted)
             return "" if hidden is None else f"{hidden.feature} {hidden.consequence}".strip()
-        effect = catalogue.get(one)
+        effect = catalogue.get(effect_id)
         drivers = drivers_of(state, effect) | drivers_of(state, catalogue.get(other))
     except MissingInput:
         return ""
     for remedy in _applicable(state, drivers):
-        if _remaining_fraction(remedy.apply(state), one, fitted, None) > _BETTER * fraction:
+        if _remaining_fraction(remedy.apply(state), effect_id, fitted, None) > _BETTER * fraction:
             output_axis, column, _ = _column(state, effect, None)
             term = factor_text(effect, output_axis, column)
             return f"{remedy.feature(state)} leaves only {100.0 * fraction:.0f} % of {term} independent of {other}"
@@ -210,12 +210,12 @@ def _effective_remedies(
             return [remedy]
     if len(applicable) < 2 or not visible(_with_all(state, applicable)):
         return []
-    kept = applicable
+    needed = applicable
     for remedy in applicable:
-        fewer = [r for r in kept if r is not remedy]
+        fewer = [r for r in needed if r is not remedy]
         if fewer and visible(_with_all(state, fewer)):
-            kept = fewer
-    return kept
+            needed = fewer
+    return needed
 
 
 def _with_all(state: State, remedies: Sequence[Remedy]) -> State:

@@ -49,7 +49,7 @@ def near_zero(state: State) -> State:
 
 
 def _again(state: State, poses_again: Iterable[tuple[int, float, float]], pace: StationPace | None = None) -> State:
-    """The plan, then poses of its own by number, each after a wait and a time without power, s; as it is without angles."""
+    """The plan, then some of its poses by number, each after a wait and a time without power, s; as it is without angles."""
     if state.outer is None or state.inner is None:
         return state
     outer, inner, last = state.outer, state.inner, last_level(state)
@@ -87,7 +87,7 @@ def with_soaks(state: State, temperatures: list[float], *, soaked: bool = True) 
 
 
 def soaks_back(state: State) -> State:
-    """The plan, then soaks at its own temperatures in the opposite order."""
+    """The plan, then its soaks in the opposite order."""
     return with_soaks(state, levels(state)[-2::-1])
 
 

@@ -181,13 +181,13 @@ def extended(
     middle = T_REFERENCE if last is None else float(np.mean(last))
     apart = np.zeros(batch) if last is None else last - middle
     there = pace.start or standing(state)
-    own = _own_heat(state)
-    ran = timeline(steps, pace, there, middle - own if pace.start is None else pace.start.temperature)
-    apart = apart + own
+    self_heating = _own_heat(state)
+    ran = timeline(steps, pace, there, middle - self_heating if pace.start is None else pace.start.temperature)
+    apart = apart + self_heating
     outer, inner = np.array([s.outer for s in steps]), np.array([s.inner for s in steps])
     scale = float(np.mean(np.linalg.norm(state.force, axis=-1)))
     force = np.broadcast_to(scale * frames.force_from_angles(outer, inner), (*wide, 3))
-    whole = np.concatenate([np.broadcast_to(state.force, (*batch, n_of(state), 3)), force], axis=-2)
+    forces = np.concatenate([np.broadcast_to(state.force, (*batch, n_of(state), 3)), force], axis=-2)
     history = state.history if pace.start is not None else _until(state.history, float(np.max(state.time)))
     rest = max(pace.rest, 0.0 if history is None else float(history.time[-1] - np.max(state.time)) - 0.5 * pace.dwell_s)
     passed = rest + 0.5 * pace.dwell_s + ran.time
@@ -197,8 +197,8 @@ def extended(
     left: dict[str, Any] = {row.attribute: _repeated(getattr(state, row.attribute), count) for row in LEFT_ALONE}
     return replace(
         state,
-        force=whole,
-        felt=_felt(state, whole, response),
+        force=forces,
+        felt=_felt(state, forces, response),
         output_run=None,
         time=_joined(state.time, np.broadcast_to(begin + ran.time, wide)),
         temperature=_joined_if(state.temperature, apart[..., None] + ran.device),
@@ -279,8 +279,8 @@ def _until(history: History | None, end: float) -> History | None:
 
 def _joined(values: Array, more: Array) -> Array:
     lead = np.broadcast_shapes(values.shape[:-1], more.shape[:-1])
-    whole = [np.broadcast_to(v, (*lead, v.shape[-1])) for v in (values, more)]
-    return np.concatenate(whole, axis=-1)
+    both = [np.broadcast_to(v, (*lead, v.shape[-1])) for v in (values, more)]
+    return np.concatenate(both, axis=-1)
 
 
 def _joined_if(values: Array | None, more: Array | None) -> Array | None:

@@ -122,10 +122,10 @@ def _information(state: State, base: Sequence[str], error: float, covariance: Ar
         return lambda columns: np.linalg.norm(columns, axis=-2) / error
     white = whitener(covariance)
     span = _span(state, base, white)
-    return lambda columns: np.linalg.norm(_beyond(span, white @ columns), axis=-2)
+    return lambda columns: np.linalg.norm(_orthogonal_part(span, white @ columns), axis=-2)
 
 
-def _beyond(span: Array, columns: Array) -> Array:
+def _orthogonal_part(span: Array, columns: Array) -> Array:
     """Columns (3, n, p) without their part in a span (3, n, q)."""
     return columns - span @ (np.swapaxes(span, -1, -2) @ columns)
 
@@ -176,14 +176,14 @@ def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | Non
 
 def _after(span: Array, columns: Array, start: Array) -> Array:
     """Columns (3, n, p) after the base model and after the unknown initial state of a memory (3, n, k)."""
-    remainder = _beyond(span, columns)
-    return _beyond(_basis(_beyond(span, start), 1e-9), remainder) if start.shape[-1] else remainder
+    remainder = _orthogonal_part(span, columns)
+    return _orthogonal_part(_basis(_orthogonal_part(span, start), 1e-9), remainder) if start.shape[-1] else remainder
 
 
-def _better(one: _Remainder, other: _Remainder) -> _Remainder:
+def _better(first: _Remainder, second: _Remainder) -> _Remainder:
     """The larger remaining fraction of two nonlinear values, with the columns of the one with the lower floor."""
-    more = one if one.remaining_fraction >= other.remaining_fraction else other
-    clearer = max((one, other), key=lambda r: float(np.max(np.linalg.norm(r.columns, axis=-2))))
+    more = first if first.remaining_fraction >= second.remaining_fraction else second
+    clearer = max((first, second), key=lambda r: float(np.max(np.linalg.norm(r.columns, axis=-2))))
     return _Remainder(more.remaining_fraction, more.by_axis, clearer.columns, clearer.before)
 
 
@@ -239,8 +239,8 @@ def alias_cosines(seen: Mapping[str, _Remainder]) -> dict[str, dict[str, float]]
     return {name: {o: _inside(spans[name], spans[o]) for o in spans if o != name} for name in spans}
 
 
-def _inside(one: Array, other: Array) -> float:
+def _inside(directions: Array, span: Array) -> float:
     """Smallest cosine of a direction of one effect with the other's span, over the axes where it is visible."""
-    inner = np.linalg.norm(np.swapaxes(other, -1, -2) @ one, axis=-2)
-    there = np.linalg.norm(one, axis=-2) > 0.5
+    inner = np.linalg.norm(np.swapaxes(span, -1, -2) @ directions, axis=-2)
+    there = np.linalg.norm(directions, axis=-2) > 0.5
     return float(np.min(inner[there], initial=1.0)) if there.any() else 0.0

@@ -63,8 +63,8 @@ def shape_of(values: Array) -> tuple[float, float]:
     skew *= np.sqrt(n * (n - 1.0)) / (n - 2.0)
     kurtosis = 3.0 + (n - 1.0) / ((n - 2.0) * (n - 3.0)) * ((n + 1.0) * (kurtosis - 3.0) + 6.0)
     skew, kurtosis = (
-        (n * own + PRIOR_VALUES * prior) / (n + PRIOR_VALUES)
-        for own, prior in zip((skew, kurtosis), HALF_NORMAL, strict=True)
+        (n * sample + PRIOR_VALUES * prior) / (n + PRIOR_VALUES)
+        for sample, prior in zip((skew, kurtosis), HALF_NORMAL, strict=True)
     )
     return float(skew), float(max(kurtosis, 1.0 + skew**2))
 
@@ -94,10 +94,10 @@ def independent(values: Array, groups: Codes) -> tuple[float, float]:
     if k < 2 or dof < 1:
         return n, n - 1.0
     total = float(np.sum((values - values.mean()) ** 2))
-    own = inside**2
-    between = max(0.0, ((total - dof * own) / (k - 1.0) - own) / ((n - np.sum(counts**2) / n) / (k - 1.0)))
-    worth = (between + own) / (between * float(np.sum(counts**2)) / n**2 + own / n)
-    return worth, (between + own) ** 2 / (between**2 / (k - 1.0) + own**2 / dof)
+    within = inside**2
+    between = max(0.0, ((total - dof * within) / (k - 1.0) - within) / ((n - np.sum(counts**2) / n) / (k - 1.0)))
+    worth = (between + within) / (between * float(np.sum(counts**2)) / n**2 + within / n)
+    return worth, (between + within) ** 2 / (between**2 / (k - 1.0) + within**2 / dof)
 
 
 def fraction_interval(count: int, total: int) -> Index:

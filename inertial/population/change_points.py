@@ -9,7 +9,9 @@ from inertial.arrays import Array
 from inertial.population.memory import TO_SIGMA, drawn_in, innovations, memories_of, memory_of
 
 FEWEST = 4  # points on either side
-LIKELY = 7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the place lies with 95 % (Hansen 2000, table 1)
+LIKELY = (
+    7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the change lies with 95 % (Hansen 2000, table 1)
+)
 DRAWN_IN = 4.0
 DOF_OF_DIFFERENCES = 1.3
 PLACES, GROWTH = 0.65, 0.68
@@ -59,11 +61,11 @@ def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     left, skipped = noise.left, values.size - noise.left.size
     if left.size < 2 * FEWEST or not noise.sigma > 0.0:
         return []
-    places = sorted(_segment(left, (0, left.size), noise, level))
+    cuts = sorted(_segment(left, (0, left.size), noise, level))
     out: list[ChangePoint] = []
-    for low, place, high in zip([0, *places], places, [*places[1:], left.size], strict=False):
+    for low, cut, high in zip([0, *cuts], cuts, [*cuts[1:], left.size], strict=False):
         offset = _best(left[low:high])
-        out.append(_described(left[low:high], low + skipped, place - low if offset is None else offset, noise))
+        out.append(_described(left[low:high], low + skipped, cut - low if offset is None else offset, noise))
     return out
 
 
@@ -104,10 +106,10 @@ def noise_of(values: Array) -> float:
 def _segment(values: Array, ends: tuple[int, int], noise: _Noise, level: float) -> list[int]:
     start, stop = ends
     part = values[start:stop]
-    place = _best(part)
-    if place is None or not _p_value(_statistic(part)[place - 1] / noise.sigma, part.size, noise) <= level:
+    cut = _best(part)
+    if cut is None or not _p_value(_statistic(part)[cut - 1] / noise.sigma, part.size, noise) <= level:
         return []
-    split = start + place
+    split = start + cut
     return [split, *_segment(values, (start, split), noise, level), *_segment(values, (split, stop), noise, level)]
 
 
@@ -135,13 +137,13 @@ def _p_value(statistic: float, n: int, noise: _Noise) -> float:
     return min(1.0, PLACES * n**GROWTH * chance)
 
 
-def _described(values: Array, offset: int, place: int, noise: _Noise) -> ChangePoint:
-    """The change at a place of a part of a series."""
+def _described(values: Array, offset: int, cut: int, noise: _Noise) -> ChangePoint:
+    """The change before the value number ``cut`` of a part of a series, which begins at ``offset`` in it."""
     statistic = _statistic(values) / noise.sigma
-    best = statistic[place - 1]
+    best = statistic[cut - 1]
     likely = np.flatnonzero(best**2 - statistic**2 <= LIKELY) + 1
     n = values.size
-    shift = float(values[place:].mean() - values[:place].mean())
-    error = float(noise.sigma * np.sqrt(1.0 / place + 1.0 / (n - place)))
+    shift = float(values[cut:].mean() - values[:cut].mean())
+    error = float(noise.sigma * np.sqrt(1.0 / cut + 1.0 / (n - cut)))
     low, high = int(likely.min()), int(likely.max())
-    return ChangePoint(offset + place, offset + low, offset + high, shift, error, _p_value(float(best), n, noise))
+    return ChangePoint(offset + cut, offset + low, offset + high, shift, error, _p_value(float(best), n, noise))

@@ -117,8 +117,8 @@ def _in_control(rng: np.random.Generator, shape: tuple[int, int], memory: float,
     if memory == 0.0 and np.isinf(tail):
         return rng.standard_normal(shape)
     before = 50 if memory else 0
-    whole = (shape[0], shape[1] + before)
-    drive = rng.standard_normal(whole) if np.isinf(tail) else rng.standard_t(tail, whole)
+    size = (shape[0], shape[1] + before)
+    drive = rng.standard_normal(size) if np.isinf(tail) else rng.standard_t(tail, size)
     return np.asarray(lfilter([1.0], [1.0, -memory], drive, axis=-1), dtype=float)[:, before:]
 
 

@@ -139,10 +139,10 @@ def _moments(
 
 def _parts(columns: Array, target: Array, kinds: Sequence[int] = (0, 1, 2)) -> Array:
     """Variances (3,) of mounting, walk and slope, none negative; those not asked for are zero."""
-    own = columns[:, list(kinds)]
-    scale = np.sqrt(np.sum(own**2, axis=0)) + 1e-300
+    chosen = columns[:, list(kinds)]
+    scale = np.sqrt(np.sum(chosen**2, axis=0)) + 1e-300
     parts = np.zeros(3)
-    parts[list(kinds)] = nnls(own / scale, target)[0] / scale
+    parts[list(kinds)] = nnls(chosen / scale, target)[0] / scale
     return parts
 
 
@@ -240,7 +240,7 @@ def first_time(condition: Flags, ahead: Array) -> Array:
 def leaves(mean: Array, deviation: Array, tolerance: float, ahead: Array) -> tuple[Array, Array, Array]:
     """When values leave ± ``tolerance``: expected time, and the 95 % interval of it, (units,) each, years ahead."""
     size, reach = np.abs(mean), NORMAL_95 * deviation
-    expected, soonest, latest = (first_time(one > tolerance, ahead) for one in (size, size + reach, size - reach))
+    expected, soonest, latest = (first_time(bound > tolerance, ahead) for bound in (size, size + reach, size - reach))
     return expected, soonest, latest
 
 

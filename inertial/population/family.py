@@ -134,8 +134,8 @@ def with_prior(covariance: Array, precision: Array) -> Array:
     """Covariance (..., p, p) of estimates of this covariance together with a prior of this precision."""
     size = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     across = size[..., :, None] * size[..., None, :]
-    own = covariance / across
-    both = np.linalg.solve(np.eye(size.shape[-1]) + own @ (precision * across), own)
+    scaled = covariance / across
+    both = np.linalg.solve(np.eye(size.shape[-1]) + scaled @ (precision * across), scaled)
     return 0.5 * (both + np.swapaxes(both, -1, -2)) * across
 
 
@@ -154,10 +154,10 @@ def _round(
     y: Array, c: Array, lot: Index, lots: int, within: Array, between: Array
 ) -> tuple[Array, Array, Array, Array]:
     """One step of EM: the next T and L, and the mean and its covariance at the present ones."""
-    own = np.asarray(np.linalg.inv(c + within), dtype=np.float64)
-    total = _by_lot(own, lot, lots)
+    precision = np.asarray(np.linalg.inv(c + within), dtype=np.float64)
+    total = _by_lot(precision, lot, lots)
     spread = np.linalg.inv(total)
-    middle = np.einsum("laij,laj->lai", spread, _by_lot(np.einsum("uaij,uaj->uai", own, y), lot, lots))
+    middle = np.einsum("laij,laj->lai", spread, _by_lot(np.einsum("uaij,uaj->uai", precision, y), lot, lots))
     known = np.linalg.inv(spread + between)
     error = np.linalg.inv(known.sum(axis=0))
     mean = np.einsum("aij,aj->ai", error, np.einsum("laij,laj->ai", known, middle))
@@ -167,7 +167,7 @@ def _round(
     next_between = _covariance(shift) + np.mean(left + gain @ error @ np.swapaxes(gain, -1, -2), axis=0)
     rest = np.eye(y.shape[-1]) - gain
     of_lot = left + rest @ error @ np.swapaxes(rest, -1, -2)
-    pull = within @ own
+    pull = within @ precision
     part = np.einsum("uaij,uaj->uai", pull, y - (mean + shift)[lot])
     next_within = _covariance(part) + np.mean(
         within - pull @ within + pull @ of_lot[lot] @ np.swapaxes(pull, -1, -2), axis=0

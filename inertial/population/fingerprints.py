@@ -37,7 +37,7 @@ class ChangeScale:
         t = np.asarray(years, dtype=float)
         change = self.change[:, self.telling]
         inside = np.clip(t, self.years[0], self.years[-1])
-        usual = np.stack([np.interp(inside, self.years, own) for own in change.T], axis=-1)
+        usual = np.stack([np.interp(inside, self.years, of_parameter) for of_parameter in change.T], axis=-1)
         return usual * np.maximum(t / max(float(self.years[-1]), _SHORTEST), 1.0)[..., None]
 
 
@@ -69,8 +69,8 @@ def _octaves(years: Array) -> list[Index]:
     octave = np.floor(np.log2(np.maximum(years, _SHORTEST)))
     parts: list[Index] = []
     waiting = np.zeros(0, dtype=np.int64)
-    for one in np.unique(octave):
-        waiting = np.concatenate([waiting, np.flatnonzero(octave == one)])
+    for number in np.unique(octave):
+        waiting = np.concatenate([waiting, np.flatnonzero(octave == number)])
         if waiting.size >= FEWEST:
             parts.append(waiting)
             waiting = np.zeros(0, dtype=np.int64)

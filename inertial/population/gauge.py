@@ -124,5 +124,5 @@ def _intervals(
     gauge = station + interaction + drawn[3]
     total = gauge + part
     percent = 100.0 * np.sqrt(np.divide(gauge, total, out=np.zeros_like(total), where=total > 0.0))
-    (low, high), (least, most) = (np.quantile(one, [0.025, 0.975]).tolist() for one in (np.sqrt(gauge), percent))
+    (low, high), (least, most) = (np.quantile(sample, [0.025, 0.975]).tolist() for sample in (np.sqrt(gauge), percent))
     return (low, high), (least, most)

@@ -35,8 +35,8 @@ class Groups:
 
     def of(self, name: str) -> tuple[Array, Array]:
         """Mean (m, p) and covariance (m, p, p) of a unit of a group, in a lot of its own."""
-        whole = self.family.within + self.family.between
-        return self.family.mean + self.shift[name], whole - self.spread + self.left[name]
+        of_family = self.family.within + self.family.between
+        return self.family.mean + self.shift[name], of_family - self.spread + self.left[name]
 
 
 def groups_of(family: Family, values: Array, covariance: Array, lot: Index, group: Sequence[str]) -> Groups:
@@ -58,22 +58,22 @@ def groups_of(family: Family, values: Array, covariance: Array, lot: Index, grou
     for k, name in enumerate(group):
         if name:
             lots.setdefault(name, {}).setdefault(int(lot[k]), []).append(k)
-    crossed = [list(own.values()) for own in lots.values() if len(own) > 1]
+    crossed = [list(of_lots.values()) for of_lots in lots.values() if len(of_lots) > 1]
     if len(crossed) < p + SPARE:
         raise NotIdentified(
             f"prior: {number_of(len(crossed), 'group')} of the attribute with units in more than one lot, {p + SPARE} are needed "
             "to tell groups from lots; leave 'attribute' out of [prior]"
         )
-    products = np.stack([_between_lots([apart[own].mean(axis=0) for own in each]) for each in crossed])
+    products = np.stack([_between_lots([apart[units].mean(axis=0) for units in each]) for each in crossed])
     # less a standard error: too large a share of the groups would make the prior of a unit too narrow
     mean, error = products.mean(axis=0), products.std(axis=0, ddof=1) / np.sqrt(len(products))
     spread = _within_limits(mean - error * np.eye(p), family.within + family.between)
     shift, left = dict[str, Array](), dict[str, Array]()
-    for name, own in lots.items():
+    for name, of_lots in lots.items():
         information, pull = np.zeros_like(spread), np.zeros_like(family.mean)
-        for units in own.values():
-            one = (family.within + covariance[units].mean(axis=0)) / len(units) + family.between
-            weight = np.linalg.inv(one)
+        for units in of_lots.values():
+            variance = (family.within + covariance[units].mean(axis=0)) / len(units) + family.between
+            weight = np.linalg.inv(variance)
             information += weight
             pull += np.einsum("aij,aj->ai", weight, apart[units].mean(axis=0))
         # W may have no inverse: (W⁻¹ + I)⁻¹ = W − W·(W + I⁻¹)⁻¹·W
@@ -89,11 +89,11 @@ def _between_lots(means: Sequence[Array]) -> Array:
     return (np.einsum("ai,aj->aij", total, total) - squares) / (len(means) * (len(means) - 1))
 
 
-def _within_limits(spread: Array, whole: Array) -> Array:
-    """A covariance (m, p, p) that is positive and explains no more than most of the whole."""
-    root = np.linalg.cholesky(whole)
+def _within_limits(spread: Array, total: Array) -> Array:
+    """A covariance (m, p, p) that is positive and explains no more than most of a total (m, p, p)."""
+    root = np.linalg.cholesky(total)
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(inverse @ spread @ np.swapaxes(inverse, -1, -2))
     turned = root @ vectors
-    kept = np.clip(values, 0.0, _MOST)
-    return np.asarray((turned * kept[..., None, :]) @ np.swapaxes(turned, -1, -2), dtype=np.float64)
+    limited = np.clip(values, 0.0, _MOST)
+    return np.asarray((turned * limited[..., None, :]) @ np.swapaxes(turned, -1, -2), dtype=np.float64)

@@ -36,7 +36,7 @@ def drawn_in(values: Array) -> Array:
 def memory_of(values: Array) -> float:
     """Correlation of neighbours of a series (n,) whose level may change, from 0 to 0.9.
 
-    From what one change of level, at its best place, leaves (corrected for its bias of (1 + 4ρ)/n: M. G. Kendall, Biometrika 41
+    From what the best change of level leaves (corrected for its bias of (1 + 4ρ)/n: M. G. Kendall, Biometrika 41
     (1954) 403), and no more than the differences of neighbours allow, which no change of level enters: their own correlation is
     −(1 − ρ)/2.
     """
@@ -46,8 +46,8 @@ def memory_of(values: Array) -> float:
     k = np.arange(FEWEST, n - FEWEST + 1)
     before = np.cumsum(values)[k - 1]
     apart = np.abs((values.sum() - before) / (n - k) - before / k) * np.sqrt(k * (n - k) / n)
-    place = int(k[np.argmax(apart)])
-    left = np.concatenate([values[:place] - values[:place].mean(), values[place:] - values[place:].mean()])
+    cut = int(k[np.argmax(apart)])
+    left = np.concatenate([values[:cut] - values[:cut].mean(), values[cut:] - values[cut:].mean()])
     raw = _neighbours(left)
     steps = np.diff(values)
     most = 1.0 + 2.0 * _neighbours(steps - steps.mean()) + 3.0 / np.sqrt(n)
@@ -73,7 +73,7 @@ def innovations(values: Array, memory: float) -> Array:
 def _running_median(values: Array) -> Array:
     """Running median (n,), the series mirrored at its ends.
 
-    With the end value itself repeated it would be its own median: a wild first value then stood for a level of its own.
+    With the end value itself repeated it would be its own median: a wild first value would then count as a level.
     """
     return median_filter(values, LOCAL, mode="mirror")
 

@@ -19,16 +19,16 @@ def unit_and_place(values: Array, units: Index, places: Index) -> tuple[Array, A
     -------
     Part of every unit, part of every place; the places' median is zero.
     """
-    unit, place = np.zeros(int(units.max()) + 1), np.zeros(int(places.max()) + 1)
+    of_units, of_places = np.zeros(int(units.max()) + 1), np.zeros(int(places.max()) + 1)
     in_units, in_places = _groups(units), _groups(places)
     for _ in range(ROUNDS):
-        unit = _medians(values - place[places], in_units)
-        refined = _medians(values - unit[units], in_places)
+        of_units = _medians(values - of_places[places], in_units)
+        refined = _medians(values - of_units[units], in_places)
         refined -= np.median(refined)
-        moved, place = np.max(np.abs(refined - place)), refined
+        moved, of_places = np.max(np.abs(refined - of_places)), refined
         if moved < SETTLED * (np.ptp(values) + 1e-300):
             break
-    return unit, place
+    return of_units, of_places
 
 
 def group_medians(values: Array, codes: Index) -> Array:

@@ -26,7 +26,7 @@ TOLD = 0.9
 FACTORS = np.geomspace(0.02, 200.0, 800)
 """Sizes over the stated one that are looked at; neighbours differ by 1.2 %."""
 LEAST_INFORMATION = 1e-6
-"""Of a direction that is kept: below it, the stated errors move the lot by a thousandth of its noise."""
+"""Least information of a direction that counts: below it, the stated errors move the lot by a thousandth of its noise."""
 HALF_CHI2_95 = 1.9207
 RIVAL = 2.0  # difference of log likelihood up to which two contributions are not told apart: a ratio of seven
 
@@ -72,22 +72,22 @@ def common_evidence(columns: Array, changes: Array, left: Array, covariance: Arr
         for axis in range(columns.shape[1]):
             white = whitener(covariance[unit, axis])
             base, _ = np.linalg.qr(white @ columns[unit, axis])
-            own = white @ changes[unit, :, axis, :]
-            own = own - base @ (base.T @ own)
-            information += own.T @ own
-            projection += own.T @ (white @ left[unit, :, axis])
+            change = white @ changes[unit, :, axis, :]
+            change = change - base @ (base.T @ change)
+            information += change.T @ change
+            projection += change.T @ (white @ left[unit, :, axis])
     return CommonEvidence(information, projection)
 
 
-def without(evidence: CommonEvidence, places: Places) -> CommonEvidence:
+def without(evidence: CommonEvidence, taken_out: Places) -> CommonEvidence:
     """The evidence on the other influences, these being free: what they can imitate is taken out."""
-    if not places.size:
+    if not taken_out.size:
         return evidence
-    kept = np.setdiff1d(np.arange(evidence.projection.size), places)
-    own = np.linalg.pinv(evidence.information[np.ix_(places, places)], hermitian=True)
-    turn = evidence.information[np.ix_(kept, places)] @ own
-    information = evidence.information[np.ix_(kept, kept)] - turn @ evidence.information[np.ix_(places, kept)]
-    return CommonEvidence(information, evidence.projection[kept] - turn @ evidence.projection[places])
+    others = np.setdiff1d(np.arange(evidence.projection.size), taken_out)
+    inverse = np.linalg.pinv(evidence.information[np.ix_(taken_out, taken_out)], hermitian=True)
+    turn = evidence.information[np.ix_(others, taken_out)] @ inverse
+    information = evidence.information[np.ix_(others, others)] - turn @ evidence.information[np.ix_(taken_out, others)]
+    return CommonEvidence(information, evidence.projection[others] - turn @ evidence.projection[taken_out])
 
 
 def sizes(
@@ -105,10 +105,10 @@ def sizes(
         scaled[:, groups[name]] *= factor
     total = np.eye(len(value)) + scaled @ scaled.T
     out = []
-    for name, places in groups.items():
-        own = columns[:, places]
-        if name not in (known or {}) and np.sum(own**2) > LEAST_INFORMATION:
-            out.append((name, *_parts(total - scaled[:, places] @ scaled[:, places].T, own, value)))
+    for name, members in groups.items():
+        of_group = columns[:, members]
+        if name not in (known or {}) and np.sum(of_group**2) > LEAST_INFORMATION:
+            out.append((name, *_parts(total - scaled[:, members] @ scaled[:, members].T, of_group, value)))
     return [_size(name, strength, part, LEVEL / len(out)) for name, strength, part in out]
 
 
@@ -123,43 +123,43 @@ def contradictions(evidence: CommonEvidence, groups: Mapping[str, Places], looke
     looked : the :func:`sizes`
     """
     found: list[Size] = []
-    while larger := [one for one in looked if probability(looked, one) < LEVEL and one.factor > 1.0]:
-        best = max(larger, key=lambda one: one.gain)
-        rivals = tuple(one.name for one in larger if one is not best and one.gain > best.gain - RIVAL)
+    while larger := [size for size in looked if probability(looked, size) < LEVEL and size.factor > 1.0]:
+        best = max(larger, key=lambda size: size.gain)
+        rivals = tuple(size.name for size in larger if size is not best and size.gain > best.gain - RIVAL)
         found.append(replace(best, rivals=rivals))
-        looked = sizes(evidence, groups, {one.name: one.factor for one in found})
+        looked = sizes(evidence, groups, {size.name: size.factor for size in found})
     return found
 
 
-def probability(looked: Sequence[Size], own: Size | None = None) -> float:
-    """Probability that an honest lot shows one of the groups so much larger than stated, the most striking or its own."""
-    least = min((one.p_value for one in looked), default=1.0) if own is None else own.p_value
+def probability(looked: Sequence[Size], named: Size | None = None) -> float:
+    """Probability that an honest lot shows one of the groups so much larger than stated: the most striking, or a named one."""
+    least = min((size.p_value for size in looked), default=1.0) if named is None else named.p_value
     return min(1.0, len(looked) * least)
 
 
-def beyond(evidence: CommonEvidence, places: Places, groups: Mapping[str, Places], found: Sequence[Size]) -> float:
+def beyond(evidence: CommonEvidence, zero: Places, groups: Mapping[str, Places], found: Sequence[Size]) -> float:
     """Probability of the residual along some influences that are taken to be zero, groups being as large as they were found."""
     columns, value = _independent(evidence)
     rest = columns.copy()
-    for one in found:
-        rest[:, groups[one.name]] *= one.factor
-    rest = np.delete(rest, places, axis=1)
-    strength, part = _parts(np.eye(len(value)) + rest @ rest.T, columns[:, places], value)
+    for size in found:
+        rest[:, groups[size.name]] *= size.factor
+    rest = np.delete(rest, zero, axis=1)
+    strength, part = _parts(np.eye(len(value)) + rest @ rest.T, columns[:, zero], value)
     return _above(float(np.sum(strength * part**2)), strength)
 
 
 def _independent(evidence: CommonEvidence) -> tuple[Array, Array]:
     """M (r, q) and w (r,) ~ N(0, 1 + M·Mᵀ): the evidence in directions of noise one."""
     values, vectors = np.linalg.eigh(evidence.information)
-    kept = values > LEAST_INFORMATION
-    root = np.sqrt(values[kept])
-    return root[:, None] * vectors[:, kept].T, vectors[:, kept].T @ evidence.projection / root
+    informative = values > LEAST_INFORMATION
+    root = np.sqrt(values[informative])
+    return root[:, None] * vectors[:, informative].T, vectors[:, informative].T @ evidence.projection / root
 
 
-def _parts(rest: Array, own: Array, value: Array) -> tuple[Array, Array]:
+def _parts(rest: Array, group: Array, value: Array) -> tuple[Array, Array]:
     """Variances κ of a group in directions in which all else has variance one, and the value in these directions."""
     white = whitener(rest)
-    vectors, strength, _ = np.linalg.svd(white @ own, full_matrices=False)
+    vectors, strength, _ = np.linalg.svd(white @ group, full_matrices=False)
     return strength**2, vectors.T @ (white @ value)
 
 

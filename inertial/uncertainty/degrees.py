@@ -26,15 +26,15 @@ def effective_degrees(u: Array, dof: Array) -> Array:
     """ν_eff of every row, by Welch and Satterthwaite (JCGM 100, G.2b): contributions u and dof (n, c), result (n,)."""
     parts = np.ascontiguousarray(u, dtype=float)
     below = np.sum(np.ascontiguousarray(parts**4 / np.asarray(dof, dtype=float)), axis=1)
-    whole = np.sum(np.ascontiguousarray(parts**2), axis=1) ** 2
-    return np.divide(whole, below, out=np.full_like(below, np.inf), where=below > 0.0)
+    numerator = np.sum(np.ascontiguousarray(parts**2), axis=1) ** 2
+    return np.divide(numerator, below, out=np.full_like(below, np.inf), where=below > 0.0)
 
 
 def coverage_factors(dof: Array, probability: float = PROBABILITY) -> Array:
     """K of Student's distribution for ν_eff truncated to a whole number (JCGM 100, G.4.1, table G.2); 2 for 95.45 % and ν = ∞."""
     finite = dof < _LARGEST
-    whole = np.maximum(np.where(finite, dof, 1.0).astype(np.int64), 1)
-    return np.where(finite, stdtrit(whole, 0.5 * (1.0 + probability)), ndtri(0.5 * (1.0 + probability)))
+    truncated = np.maximum(np.where(finite, dof, 1.0).astype(np.int64), 1)
+    return np.where(finite, stdtrit(truncated, 0.5 * (1.0 + probability)), ndtri(0.5 * (1.0 + probability)))
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,15 @@ class DeviationLaw:
 
     def quantile(self, probability: float) -> float:
         """Upper limit of σ that holds with a probability; zero where the removed part explains as much."""
-        whole = (self.value**2 + self.removed**2) * self.dof / float(chi2_quantile(1.0 - probability, self.dof))
-        return float(np.sqrt(max(whole - self.removed**2, 0.0)))
+        variance = (self.value**2 + self.removed**2) * self.dof / float(chi2_quantile(1.0 - probability, self.dof))
+        return float(np.sqrt(max(variance - self.removed**2, 0.0)))
 
     def beyond(self, limit: float) -> float:
         """Probability that σ exceeds a limit."""
-        whole = limit**2 + self.removed**2
-        if not whole > 0.0:
+        variance = limit**2 + self.removed**2
+        if not variance > 0.0:
             return 1.0
-        return 1.0 - float(chi2_tail(self.dof * (self.value**2 + self.removed**2) / whole, self.dof))
+        return 1.0 - float(chi2_tail(self.dof * (self.value**2 + self.removed**2) / variance, self.dof))
 
     def threshold(self, limit: float, guard: float) -> float:
         """The estimate at which σ exceeds the limit with the probability 1 − Φ(guard).

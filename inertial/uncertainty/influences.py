@@ -47,7 +47,7 @@ class Errors:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def times(self, size: float) -> "Errors":
-        """The same errors, scaled."""
+        """The errors times a factor."""
         scaled: dict[str, Any] = {
             name: tuple(size * v for v in value) if isinstance(value, tuple) else size * value
             for name, value in vars(self).items()
@@ -137,7 +137,7 @@ def true_force(state: State, errors: Errors) -> Array:
 
 
 def _of_one(angle: Array) -> Array:
-    """The angles (n,) of one unit where all units (..., n) have the same, as on one table; else as they are."""
+    """The angles (n,) of one unit where all units (..., n) have equal ones, as on one table; else as they are."""
     rows = angle.reshape(-1, angle.shape[-1]) if angle.ndim > 1 else angle
     return (
         rows[0]
@@ -170,25 +170,25 @@ def sensitivity(
     entered: list[tuple[Array, InputQuantity | Scattered]] = [
         (influence.u * difference(model, state, influence.errors)[..., None], influence) for influence in influences
     ]
-    for one in scattered:
-        for size, errors in ((one.outer, Errors(outer=1.0)), (one.inner, Errors(inner=1.0))):
+    for scatter in scattered:
+        for size, errors in ((scatter.outer, Errors(outer=1.0)), (scatter.inner, Errors(inner=1.0))):
             if size > 0.0:
                 change = size * difference(model, state, errors)
                 every = np.arange(change.shape[-2])
-                drawn = poses_of(state) if one.scope in SAME_AT_EVERY_VISIT else every
+                drawn = poses_of(state) if scatter.scope in SAME_AT_EVERY_VISIT else every
                 single = np.zeros((*change.shape, int(drawn.max(initial=-1)) + 1))
                 single[..., every, :, drawn] = np.moveaxis(change, -2, 0)
-                entered.append((single, one))
+                entered.append((single, scatter))
     if entered:
         changes = np.concatenate([columns for columns, _ in entered], axis=-1)
     else:
         changes = np.zeros((*predict(model.effects, state, model.coefficients, model.nonlinear).shape, 0))
-    sources = [one for columns, one in entered for _ in range(columns.shape[-1])]
+    sources = [source for columns, source in entered for _ in range(columns.shape[-1])]
     return Sensitivity(
         changes,
         tuple(source.contribution for source in sources),
-        tuple(one.dof for one in sources),
-        tuple(one.seen for one in sources),
+        tuple(source.dof for source in sources),
+        tuple(source.seen for source in sources),
     )
 
 
@@ -198,9 +198,9 @@ def poses_of(state: State) -> Places:
         raise ValueError("dwells without angles: their poses are not known")
     levels = np.zeros((2, state.outer.shape[-1]), dtype=np.intp)
     for level, angle in zip(levels, (state.outer, state.inner), strict=True):
-        own = np.degrees(angle.reshape(-1, angle.shape[-1])[0])
-        order = np.argsort(own)
-        level[order[1:]] = np.cumsum(np.diff(own[order]) > APART_DEG)
+        degrees = np.degrees(angle.reshape(-1, angle.shape[-1])[0])
+        order = np.argsort(degrees)
+        level[order[1:]] = np.cumsum(np.diff(degrees[order]) > APART_DEG)
     return np.unique(levels, axis=1, return_inverse=True)[1].reshape(-1)
 
 

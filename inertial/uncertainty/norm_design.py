@@ -44,8 +44,8 @@ class NormDesign:
         """Share (q,) of the influences on the norms that the residuals of the fit can show."""
         shown = self._shown(changes)[self.used]
         left = shown - self.rows[self.used] @ (self.gain @ shown)
-        whole = np.linalg.norm(shown, axis=0)
-        return np.linalg.norm(left, axis=0) / np.where(whole > 0.0, whole, 1.0)
+        total = np.linalg.norm(shown, axis=0)
+        return np.linalg.norm(left, axis=0) / np.where(total > 0.0, total, 1.0)
 
     def prediction(self, covariance: Array) -> Array:
         """Covariance (m, m) of the residuals of the dwells that are not fitted, g², by the noise of all dwells (n, n)."""
@@ -76,9 +76,9 @@ def norm_design(model: MeasurementModel, state: State, covariance: Array, used: 
     free = np.array([[is_free(axis, pair) for pair in names[axis]] for axis in range(3)])
     rows = -np.einsum("nj,jnp->njp", along, columns)[:, free]
     size = np.linalg.norm(rows[used], axis=0)
-    own = rows[used] / np.where(size > 0.0, size, 1.0)
-    weighted = np.linalg.solve(covariance[np.ix_(used, used)], own)
-    gain = np.linalg.pinv(own.T @ weighted, rcond=1e-13) @ weighted.T / np.where(size > 0.0, size, 1.0)[:, None]
+    scaled = rows[used] / np.where(size > 0.0, size, 1.0)
+    weighted = np.linalg.solve(covariance[np.ix_(used, used)], scaled)
+    gain = np.linalg.pinv(scaled.T @ weighted, rcond=1e-13) @ weighted.T / np.where(size > 0.0, size, 1.0)[:, None]
     return NormDesign(rows, along, gain, used, free, names)
 
 

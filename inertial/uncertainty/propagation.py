@@ -23,7 +23,7 @@ class FitDesign:
 
     columns : (..., 3, n, p), H; gain : (..., 3, p, n), G; names : per axis, (effect id, coefficient) of the p columns
     shared : (..., 3, n, s), columns of parameters that the lot shares; none where s = 0
-    whitening : (n, n), root of the weights; axes : the m axes with an output, in the place of three
+    whitening : (n, n), root of the weights; axes : the m axes with an output, of x, y, z
     """
 
     columns: Array
@@ -58,8 +58,8 @@ class FitDesign:
         """
         explained = self.columns @ (self.coefficient_errors(changes) if errors is None else errors)
         left = np.subtract(np.moveaxis(changes, -2, -3), explained, out=explained)
-        whole = _sizes(changes)
-        return _sizes(left) / np.where(whole > 0.0, whole, 1.0)
+        total = _sizes(changes)
+        return _sizes(left) / np.where(total > 0.0, total, 1.0)
 
 
 def _sizes(columns: Array) -> Array:
@@ -113,7 +113,7 @@ class Propagated:
 
     coefficients : (..., 3, p, q); names : per axis, (effect id, coefficient)
     source : the influences, of the same q columns
-    axes : the m axes with an output, in the place of three
+    axes : the m axes with an output, of x, y, z
     """
 
     coefficients: Array
@@ -124,8 +124,8 @@ class Propagated:
 
     def _inverse(self) -> Array:
         """K⁻¹ of the axes with an output, (..., m, m), g per unit of the output."""
-        own = of_axes(of_axes(self.response, self.axes, -1), self.axes, -2)
-        return np.asarray(np.linalg.inv(own), dtype=np.float64)
+        response = of_axes(of_axes(self.response, self.axes, -1), self.axes, -2)
+        return np.asarray(np.linalg.inv(response), dtype=np.float64)
 
     def covariance(self) -> Array:
         """Covariance of the coefficients of all axes in one vector, (..., 3p, 3p)."""

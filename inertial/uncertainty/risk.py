@@ -70,8 +70,8 @@ def _nodes(mean: float, process: float, turns: list[tuple[tuple[float, float], f
         return np.array([mean]), np.ones(1)
     low, high = mean - _REACH * process, mean + _REACH * process
     steps = (-8.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0)
-    places = [end + k * width for ends, width in [*turns, ((mean, mean), process)] for end in ends for k in steps]
-    edges = np.unique(np.clip([low, high, *places], low, high))
+    nodes = [end + k * width for ends, width in [*turns, ((mean, mean), process)] for end in ends for k in steps]
+    edges = np.unique(np.clip([low, high, *nodes], low, high))
     half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
     z = middle + half * _NODES
     density = np.exp(-0.5 * ((z - mean) / process) ** 2) / (process * np.sqrt(2.0 * np.pi))

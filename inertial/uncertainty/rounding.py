@@ -18,26 +18,26 @@ def rounded(value: float, expanded: float) -> tuple[str, str]:
     if not expanded > 0.0:
         return f"{value:.4g}", "0"
     u = Decimal(repr(float(expanded)))
-    place = u.adjusted() - 1
-    shown = _to(u, place)
+    exponent = u.adjusted() - 1
+    shown = _to(u, exponent)
     if shown < u * Decimal("0.95"):
-        shown = u.quantize(Decimal(1).scaleb(place), rounding=ROUND_CEILING)
-    if shown.adjusted() - 1 > place:
-        place = shown.adjusted() - 1
-        shown = _to(shown, place)
-    number = _to(Decimal(repr(float(value))), place)
+        shown = u.quantize(Decimal(1).scaleb(exponent), rounding=ROUND_CEILING)
+    if shown.adjusted() - 1 > exponent:
+        exponent = shown.adjusted() - 1
+        shown = _to(shown, exponent)
+    number = _to(Decimal(repr(float(value))), exponent)
     if number == 0:
         number = abs(number)
-    return _text(number, place), _text(shown, place)
+    return _text(number, exponent), _text(shown, exponent)
 
 
-def _to(number: Decimal, place: int) -> Decimal:
-    step = Decimal(1).scaleb(place)
+def _to(number: Decimal, exponent: int) -> Decimal:
+    step = Decimal(1).scaleb(exponent)
     return (number / step).quantize(Decimal(1), rounding=ROUND_HALF_UP) * step
 
 
-def _text(number: Decimal, place: int) -> str:
-    return f"{number:.{max(-place, 0)}f}"
+def _text(number: Decimal, exponent: int) -> str:
+    return f"{number:.{max(-exponent, 0)}f}"
 
 
 LEAST_P = 1e-3
@@ -52,7 +52,7 @@ def chance(p: float | None) -> str:
 
 
 def equal(p: float | None) -> str:
-    """The same with its sign."""
+    """The text of :func:`chance` after ``=``, or as it is where it begins with ``<``."""
     text = chance(p)
     return text if text.startswith("<") else f"= {text}"
 
@@ -63,9 +63,9 @@ def short(value: float | None, digits: int = 3) -> str:
         return ""
     if value == 0.0:
         return "0"
-    places = digits - 1 - math.floor(math.log10(abs(value)))
-    if -3 <= places <= 6:
-        return f"{round(value, places):.{max(places, 0)}f}"
+    decimals = digits - 1 - math.floor(math.log10(abs(value)))
+    if -3 <= decimals <= 6:
+        return f"{round(value, decimals):.{max(decimals, 0)}f}"
     return f"{value:.{digits - 1}e}"
 
 

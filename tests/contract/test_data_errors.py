@@ -58,26 +58,28 @@ def lacks_as_handling(module: ModuleType, lot: Lot) -> list[str]:
 
 
 def _lacks_in_a_lot(error: Handling, lot: Lot) -> list[str]:
-    """What it lacks of places, columns and words in a lot in which it can be."""
+    """What it lacks of locations, columns and words in a lot in which it can be."""
     units, n = lot.state.time.shape
     slope = np.full((units, n, 3), 1e-5)
-    places = error.places(lot)
-    if not places:
-        return ["a place in a lot with everything recorded"]
-    place = places[len(places) // 2]
-    change, alike = error.change(lot, slope, **place), {k: v for k, v in place.items() if k != "unit"}
+    locations = error.locations(lot)
+    if not locations:
+        return ["a location in a lot with everything recorded"]
+    location = locations[len(locations) // 2]
+    change, alike = error.change(lot, slope, **location), {k: v for k, v in location.items() if k != "unit"}
     lacks: list[str] = []
     if change.shape[0] not in {1, units} or change.shape[1:3] != (n, 3) or not change.shape[-1]:
         return [f"columns of the shape (units, {n}, 3, k), {change.shape} are there"]
     size = np.full(change.shape[-1], 1e-3)
     lacks += [] if np.isfinite(change).all() and change.any() else ["finite columns that are not all zero"]
-    if "other" not in place:
+    if "other" not in location:
         of_each = error.of_each_unit(lot, slope, **alike)
         lacks += [] if of_each.shape[-1] == change.shape[-1] else ["of_each_unit with as many columns"]
-    lacks += [] if len(error.describe(lot, size, **place)) > 20 else ["a description"]
-    lacks += [] if all(set(near) == set(place) for near in error.near(lot, **place)) else ["places near a place"]
-    lacks += [] if set(error.units(**place)) <= set(range(units)) else ["units of the lot"]
-    lacks += [] if set(error.dwells(lot, **place)) <= set(range(n)) else ["dwells of the lot"]
+    lacks += [] if len(error.describe(lot, size, **location)) > 20 else ["a description"]
+    lacks += (
+        [] if all(set(near) == set(location) for near in error.near(lot, **location)) else ["locations near a location"]
+    )
+    lacks += [] if set(error.units(**location)) <= set(range(units)) else ["units of the lot"]
+    lacks += [] if set(error.dwells(lot, **location)) <= set(range(n)) else ["dwells of the lot"]
     return lacks
 
 
@@ -97,7 +99,7 @@ def test_an_error_of_handling_that_is_half_there_is_told_with_what_it_lacks() ->
     source = "class Half(Handling):\n    id = 'bias'\n    symbol = equation = ''\n    hides_behind = ('nothing',)"
     exec(source, vars(half) | {"Handling": Handling, "__name__": "half"}, vars(half))
     half.Half.__module__ = "half"
-    assert lacks_as_handling(half, lot) == ["change", "describe", "places"]
+    assert lacks_as_handling(half, lot) == ["change", "describe", "locations"]
     whole = import_module(f"{handling.__name__}.gain_step").GainStep
     half.Half = type("Half", (whole,), {**vars(half.Half), "__module__": "half", "__doc__": ""})
     assert lacks_as_handling(half, lot) == [

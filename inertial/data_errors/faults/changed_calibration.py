@@ -14,17 +14,17 @@ def changed_units(readings: Readings) -> Iterator[Fault]:
         u: s for u in range(len(readings.force)) if (s := find_split(readings.force[u], readings.output[u])) is not None
     }
     for unit, split in splits.items():
-        places = tuple(range(split.place, int(np.flatnonzero(readings.there[unit])[-1]) + 1))
+        dwells = tuple(range(split.dwell, int(np.flatnonzero(readings.there[unit])[-1]) + 1))
         partner = next((v for v, other in splits.items() if v != unit and exchanged(split, other)), None)
         if partner is not None:
-            evidence = f"from dwell {{dwell[{split.place}]}} on it has the calibration of unit {{unit[{partner}]}}"
-            yield Fault("units_swapped", unit, places, evidence)
+            evidence = f"from dwell {{dwell[{split.dwell}]}} on it has the calibration of unit {{unit[{partner}]}}"
+            yield Fault("units_swapped", unit, dwells, evidence)
         elif not 0.75 < split.ratio < 1.33:
             yield Fault(
                 "wrong_range",
                 unit,
-                places,
-                f"scale changes by a factor {split.ratio:.3g} at dwell {{dwell[{split.place}]}}",
+                dwells,
+                f"scale changes by a factor {split.ratio:.3g} at dwell {{dwell[{split.dwell}]}}",
             )
 
 

@@ -14,13 +14,13 @@ def clock(readings: Readings) -> Iterator[Fault]:
         row = readings.there[unit]
         back = np.flatnonzero(np.diff(time[row]) < 0.0)
         if back.size:
-            places = np.flatnonzero(row)[back + 1]
+            dwells = np.flatnonzero(row)[back + 1]
             step = float(np.diff(time[row])[back[0]])
             yield Fault(
                 "clock_jitter",
                 unit,
-                tuple(places.tolist()),
-                f"time steps back by {-step:.1f} s at dwell {{dwell[{places[0]}]}}",
+                tuple(dwells.tolist()),
+                f"time steps back by {-step:.1f} s at dwell {{dwell[{dwells[0]}]}}",
             )
 
 

@@ -23,10 +23,10 @@ def dropped(readings: Readings) -> Iterator[Fault]:
         if np.nanmean(np.abs(readings.count / expected - 1.0) > 0.1) > 0.4:
             return  # dwells of planned different length
     for unit, row in enumerate(readings.count / np.maximum(expected, 1e-9)):
-        places = np.flatnonzero(row < 0.85)
-        if places.size:
-            evidence = f"{number_of(places.size, 'dwell')} hold as little as {float(np.nanmin(row)):.0%} of the samples"
-            yield Fault("dropped_samples", unit, tuple(places.tolist()), evidence)
+        dwells = np.flatnonzero(row < 0.85)
+        if dwells.size:
+            evidence = f"{number_of(dwells.size, 'dwell')} hold as little as {float(np.nanmin(row)):.0%} of the samples"
+            yield Fault("dropped_samples", unit, tuple(dwells.tolist()), evidence)
 
 
 def _of_own_lengths(readings: Readings) -> bool:

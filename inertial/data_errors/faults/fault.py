@@ -12,7 +12,7 @@ from inertial.data_errors.readings import Readings
 class Fault:
     """A data fault of one unit: its name, its dwells, and the evidence.
 
-    Units and dwells are places in the lot; in the evidence, too: ``{unit[1]}``, ``{dwell[32]}``.
+    Units and dwells are indices in the lot; in the evidence, too: ``{unit[1]}``, ``{dwell[32]}``.
     """
 
     name: str
@@ -21,7 +21,7 @@ class Fault:
     evidence: str
 
     def named(self, units: Sequence[str], dwells: Sequence[int]) -> "Fault":
-        """The same with the serials and the numbers of dwells in its evidence."""
+        """The fault with serials and numbers of dwells instead of indices in its evidence."""
         return replace(self, evidence=self.evidence.format(unit=units, dwell=dwells))
 
 
@@ -32,7 +32,7 @@ class Look:
     find : the faults in the readings of a lot
     names : of the faults that it finds
     order : of two tests that find one in a unit the lower decides
-    order_in_one_pose : the same for a record in one pose, whose response is unknown and whose output may repeat; None: no test
+    order_in_one_pose : its order for a record in one pose, whose response is unknown and whose output may repeat; None: no test
     of_missing : whether what it finds may be the dwells alone that a unit lacks
     """
 

@@ -24,17 +24,17 @@ def noisy(readings: Readings) -> Iterator[Fault]:
         level = np.nanmedian(readings.vibration, axis=1, keepdims=True)
         loud &= ~(readings.vibration > 2.0 * np.maximum(level, 1e-12))[..., None]
     for unit, row in enumerate(np.asarray(loud)):
-        places = np.flatnonzero(row.any(axis=-1))
-        if not places.size:
+        dwells = np.flatnonzero(row.any(axis=-1))
+        if not dwells.size:
             continue
-        together = float(np.mean(row[places].sum(axis=-1)))
-        name = "torn_words" if together > 2.0 and places.size >= 3 else "spikes"
+        together = float(np.mean(row[dwells].sum(axis=-1)))
+        name = "torn_words" if together > 2.0 and dwells.size >= 3 else "spikes"
         worst = float(np.nanmax(np.where(row, ratio[unit], 0.0)))
         yield Fault(
             name,
             unit,
-            tuple(places.tolist()),
-            f"scatter up to {worst:.0f} times the unit's own in {number_of(places.size, 'dwell')}",
+            tuple(dwells.tolist()),
+            f"scatter up to {worst:.0f} times the unit's own in {number_of(dwells.size, 'dwell')}",
         )
 
 

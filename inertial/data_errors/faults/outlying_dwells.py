@@ -17,10 +17,10 @@ def outliers(readings: Readings) -> Iterator[Fault]:
     typical = np.nanmedian(size, axis=1, keepdims=True)
     out = np.any(size > np.maximum(0.005, 40.0 * typical), axis=-1)
     for unit, row in enumerate(np.asarray(out)):
-        places = np.flatnonzero(row)
-        if 0 < places.size <= 0.1 * row.size:
+        dwells = np.flatnonzero(row)
+        if 0 < dwells.size <= 0.1 * row.size:
             yield Fault(
-                "spikes", unit, tuple(places.tolist()), f"{number_of(places.size, 'dwell')} far from the others"
+                "spikes", unit, tuple(dwells.tolist()), f"{number_of(dwells.size, 'dwell')} far from the others"
             )
 
 

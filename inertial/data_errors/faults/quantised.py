@@ -43,8 +43,8 @@ def quantised(readings: Readings) -> Iterator[Fault]:
 def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
     """Step of a converter that is coarser than the noise of a sample; None where there is none.
 
-    With steps q well above the noise, samples take the two next values: their variance is q²·p·(1 − p), p the place of the mean
-    between the two, and it comes again with every step. Noise that grows with temperature, or in time, is no such scatter:
+    With steps q well above the noise, samples take the two next values: their variance is q²·p·(1 − p), p the position of
+    the mean between the two, and it repeats with every step. Noise that grows with temperature, or in time, is no such scatter:
     the means follow the temperature too, and some step fits both. What follows either is left out.
     """
     if readings.spread is None or readings.count is None:
@@ -59,7 +59,7 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
     square = _without_drivers(readings, unit, there, spread**2)
     if np.std(square) / (2.0 * typical**2) < decisions.STEPS_UNEVEN / np.sqrt(2.0 * float(np.median(count))):
         return None
-    whole, reach = float(np.sum(square**2)), float(np.ptp(mean))
+    total, reach = float(np.sum(square**2)), float(np.ptp(mean))
     # p(1 − p) is at most a quarter: the largest scatter is half a step
     low, high = 1.6 * float(spread.max()), 2.6 * float(spread.max())
     if reach <= 0.0 or reach / low > _MOST_STEPS:
@@ -72,10 +72,10 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
         waves = waves - waves.mean(axis=1, keepdims=True)
         gram = np.swapaxes(waves, -1, -2) @ waves + 1e-9 * np.eye(2)
         inside = np.einsum("rnk,n->rk", waves, square)
-        explained = np.einsum("rk,rk->r", inside, np.linalg.solve(gram, inside[..., None])[..., 0]) / whole
-        place = int(np.argmax(explained))
-        if explained[place] > best:
-            best, step = float(explained[place]), 1.0 / float(part[place])
+        explained = np.einsum("rk,rk->r", inside, np.linalg.solve(gram, inside[..., None])[..., 0]) / total
+        peak = int(np.argmax(explained))
+        if explained[peak] > best:
+            best, step = float(explained[peak]), 1.0 / float(part[peak])
     return step if best > decisions.STEPS_FOLLOW else None
 
 
@@ -85,10 +85,10 @@ def _without_drivers(readings: Readings, unit: int, there: Flags, values: Array)
     for driver in (readings.warm, readings.time):
         if driver is None:
             continue
-        own = driver[unit, there]
-        if np.isfinite(own).all() and np.ptp(own) > 0.0:
-            unit_ranges.append(2.0 * (own - own.min()) / np.ptp(own) - 1.0)
-    powers = [own**k for k in range(1, _DEGREE + 1) for own in unit_ranges]
+        measured = driver[unit, there]
+        if np.isfinite(measured).all() and np.ptp(measured) > 0.0:
+            unit_ranges.append(2.0 * (measured - measured.min()) / np.ptp(measured) - 1.0)
+    powers = [unit_range**k for k in range(1, _DEGREE + 1) for unit_range in unit_ranges]
     # few dwells: many columns would take up the steps of a converter, too
     x = np.stack([np.ones(values.size), *powers[: values.size // _DWELLS_EACH]], axis=1)
     left: Array = values - x @ np.linalg.lstsq(x, values, rcond=1e-9)[0]

@@ -46,11 +46,11 @@ def _moved_elsewhere(readings: Readings, unit: int, stretch: slice) -> float:
 
 def _longest_repeat(row: Array) -> tuple[int, int]:
     best, start = (0, 0), 0
-    for place in range(1, row.size + 1):
-        if place == row.size or row[place] != row[start]:
-            if place - start > best[1]:
-                best = (start, place - start)
-            start = place
+    for dwell in range(1, row.size + 1):
+        if dwell == row.size or row[dwell] != row[start]:
+            if dwell - start > best[1]:
+                best = (start, dwell - start)
+            start = dwell
     return best
 
 

@@ -11,7 +11,7 @@ from inertial.data_errors.readings import Readings
 
 
 def stuck(readings: Readings) -> Iterator[Fault]:
-    """The same output, to the last digit, in dwells of different poses; or samples of a dwell that are all the same."""
+    """Outputs equal to the last digit in dwells of different poses; or samples of a dwell that are all equal."""
     for unit, out in enumerate(readings.output):
         still = _still(readings, unit)
         if still.size:
@@ -23,12 +23,12 @@ def stuck(readings: Readings) -> Iterator[Fault]:
         moved = np.linalg.norm(np.diff(readings.force[unit], axis=0), axis=-1) > 0.05
         same = (np.diff(out, axis=0) == 0.0).any(axis=-1) & moved
         if np.count_nonzero(same) >= 2:
-            places = np.flatnonzero(same) + 1
+            dwells = np.flatnonzero(same) + 1
             yield Fault(
                 "stuck_output",
                 unit,
-                tuple(places.tolist()),
-                f"output repeats exactly in {number_of(places.size, 'dwell')} of new poses",
+                tuple(dwells.tolist()),
+                f"output repeats exactly in {number_of(dwells.size, 'dwell')} of new poses",
             )
 
 

@@ -17,29 +17,34 @@ def swapped_units(readings: Readings) -> Iterator[Fault]:
     if units < 2:
         return
     exchanged: dict[tuple[int, int], list[int]] = {}
-    # who is at home in its own calibration was not exchanged
+    # a unit that fits its own calibration was not exchanged
     away = np.any(np.linalg.norm(readings.misfit, axis=-1) > _AWAY, axis=0)
-    for place in np.flatnonzero(away).tolist():
-        for pair in _exchanges(readings, place):
-            exchanged.setdefault(pair, []).append(place)
-    for (one, other), places in exchanged.items():
-        if len(places) >= max(3, n // 20):
-            for unit, partner in ((one, other), (other, one)):
-                evidence = f"{len(places)} dwells have the bias and scale of unit {{unit[{partner}]}}"
-                yield Fault("units_swapped", unit, tuple(places), evidence)
+    for dwell in np.flatnonzero(away).tolist():
+        for pair in _exchanges(readings, dwell):
+            exchanged.setdefault(pair, []).append(dwell)
+    for (first, second), dwells in exchanged.items():
+        if len(dwells) >= max(3, n // 20):
+            for unit, partner in ((first, second), (second, first)):
+                evidence = f"{len(dwells)} dwells have the bias and scale of unit {{unit[{partner}]}}"
+                yield Fault("units_swapped", unit, tuple(dwells), evidence)
 
 
-def _exchanges(readings: Readings, place: int) -> Iterator[tuple[int, int]]:
+def _exchanges(readings: Readings, dwell: int) -> Iterator[tuple[int, int]]:
     """Pairs of units whose outputs at one dwell fit each other's calibration far better than their own."""
-    there = np.flatnonzero(readings.there[:, place])
-    predicted = np.einsum("vip,up->uvi", readings.fits[there], design(readings.force[there, place]))
+    there = np.flatnonzero(readings.there[:, dwell])
+    predicted = np.einsum("vip,up->uvi", readings.fits[there], design(readings.force[there, dwell]))
     scale = readings.scale[there]
-    distance = np.linalg.norm((readings.output[there, place][:, None] - predicted) / scale[:, None, None], axis=-1)
-    own = np.diag(distance)
+    distance = np.linalg.norm((readings.output[there, dwell][:, None] - predicted) / scale[:, None, None], axis=-1)
+    own_distance = np.diag(distance)
     best = np.argmin(distance, axis=1)
     for i, j in enumerate(best):
         mutual = j > i and best[j] == i
-        if mutual and distance[i, j] < 0.2 * own[i] and distance[j, i] < 0.2 * own[j] and own[i] > _AWAY:
+        if (
+            mutual
+            and distance[i, j] < 0.2 * own_distance[i]
+            and distance[j, i] < 0.2 * own_distance[j]
+            and own_distance[i] > _AWAY
+        ):
             yield int(there[i]), int(there[j])
 
 

@@ -25,15 +25,15 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
     # of two units that were exchanged the search for effects reports it, too
     swapped = set(_exchanged(readings)) if out.any() else set[int]()
     for unit, row in enumerate(out):
-        places = np.flatnonzero(row)
-        if not places.size or places.size > 0.4 * row.size or unit in swapped:
+        dwells = np.flatnonzero(row)
+        if not dwells.size or dwells.size > 0.4 * row.size or unit in swapped:
             continue
-        felt = _felt(readings, unit, places)
+        felt = _felt(readings, unit, dwells)
         turned = np.abs(np.linalg.norm(felt, axis=-1) - 1.0) < 0.02
         if not turned.any():
             continue
-        name, text = _which_pose(readings.force[unit], places[turned], felt[turned])
-        yield Fault(name, unit, tuple(places[turned].tolist()), text)
+        name, text = _which_pose(readings.force[unit], dwells[turned], felt[turned])
+        yield Fault(name, unit, tuple(dwells[turned].tolist()), text)
 
 
 def _exchanged(readings: Readings) -> Iterator[int]:
@@ -41,26 +41,26 @@ def _exchanged(readings: Readings) -> Iterator[int]:
     warm = readings.warm
     theta = None if warm is None or not np.isfinite(warm[readings.there]).all() else warm
     output = readings.output
-    fit = PlainFit(output, readings.force, theta, readings.there, lambda one, other: output[[other, one]])
+    fit = PlainFit(output, readings.force, theta, readings.there, lambda unit, partner: output[[partner, unit]])
     for pair in fit.pairs():
         if fit.ranges(*pair):
             yield from pair
 
 
-def _felt(readings: Readings, unit: int, places: Places) -> Array:
+def _felt(readings: Readings, unit: int, dwells: Places) -> Array:
     """Specific force that the outputs at some dwells stand for, (k, 3), g."""
     fit = readings.fits[unit]
-    return np.linalg.solve(fit[:, 1:], (readings.output[unit, places] - fit[:, 0]).T).T
+    return np.linalg.solve(fit[:, 1:], (readings.output[unit, dwells] - fit[:, 0]).T).T
 
 
-def _which_pose(force: Array, places: Places, felt: Array) -> tuple[str, str]:
-    for i, a in enumerate(places):
-        for j in range(i + 1, len(places)):
-            b = places[j]
+def _which_pose(force: Array, dwells: Places, felt: Array) -> tuple[str, str]:
+    for i, a in enumerate(dwells):
+        for j in range(i + 1, len(dwells)):
+            b = dwells[j]
             if np.linalg.norm(felt[i] - force[b]) < 0.05 and np.linalg.norm(felt[j] - force[a]) < 0.05:
                 return "swapped_dwells", f"dwells {{dwell[{a}]}} and {{dwell[{b}]}} have exchanged poses"
-    angle = np.degrees(np.arccos(np.clip(np.sum(felt[0] * force[places[0]]), -1.0, 1.0)))
-    return "wrong_pose", f"dwell {{dwell[{places[0]}]}} was measured {angle:.1f}° from the commanded pose"
+    angle = np.degrees(np.arccos(np.clip(np.sum(felt[0] * force[dwells[0]]), -1.0, 1.0)))
+    return "wrong_pose", f"dwell {{dwell[{dwells[0]}]}} was measured {angle:.1f}° from the commanded pose"
 
 
 LOOK = Look(wrong_poses, ("swapped_dwells", "wrong_pose"), order=100)

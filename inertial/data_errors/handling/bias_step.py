@@ -9,7 +9,7 @@ class BiasStep(OfOneUnit, Change):
     """One unit whose bias is another on all axes from a dwell on, and no other unit's.
 
     A unit that was taken out and put back has another stress in its case, a unit that fell has another bias. As the jumps of
-    three axes it would need three places in time, as an effect the coefficients of all units.
+    three axes it would need three dwells of change, as an effect the coefficients of all units.
     """
 
     id = "bias_step"
@@ -25,7 +25,7 @@ class BiasStep(OfOneUnit, Change):
         axes = len(lot.state.axes)
         return np.broadcast_to(np.eye(axes), (1, lot.state.time.shape[1], axes, axes))
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         changes = ", ".join(
             f"{axis} {1e6 * v:+.0f}" for axis, v in zip((AXES[k] for k in lot.state.axes), size, strict=True)
         )

@@ -20,15 +20,15 @@ class BiasUnsteady(OfOneAxis):
     breaker = "the same soaks once more: an effect of the temperature returns, an unsteady bias does not"
     hides_behind = ("bias_temperature_quadratic", "thermal_hysteresis")
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Every axis of every unit; none with less than three soaks."""
         return axes_of_units(lot) if int(soaks(lot.state).max(initial=0)) + 1 >= _FEWEST else []
 
-    def levels(self, lot: Lot, **place: float) -> Array:
+    def levels(self, lot: Lot, **location: float) -> Array:
         soak = soaks(lot.state)
         return (soak[:, None] == np.arange(1, int(soak.max()) + 1)).astype(np.float64)
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         """The axis and its changes: what is linear in the temperature belongs to the bias and its temperature coefficient."""
         soak = soaks(lot.state)
         read = np.zeros(soak.size) if lot.state.temperature is None else lot.state.temperature.mean(axis=0)
@@ -36,7 +36,7 @@ class BiasUnsteady(OfOneAxis):
         line = np.stack([np.ones(levels.size), warm - warm.mean()], axis=-1)
         levels = levels - line @ np.linalg.lstsq(line, levels, rcond=None)[0]
         by_soak = ", ".join(f"{1e6 * v:+.0f}" for v in levels)
-        axis = AXES[lot.state.axes[int(place["axis"])]]
+        axis = AXES[lot.state.axes[int(location["axis"])]]
         return (
             f"the bias of axis {axis} of the unit differs from soak to soak ({by_soak} µg from a line over temperature)"
         )

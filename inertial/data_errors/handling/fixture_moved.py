@@ -16,7 +16,7 @@ class FixtureMoved(Change):
     def addition(self, lot: Lot) -> Array:
         return rotated_force(lot)
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         return f"all units {turned(size)}; tighten it and repeat"
 
 

@@ -13,5 +13,5 @@ class GainStep(OfOneUnit, ReferenceStep):
     breaker = "another slot or another reader for the unit"
     fewest_units = 1
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         return f"all scale factors of the unit changed by {1e6 * size[0]:+.0f} ppm; look at its supply and reader"

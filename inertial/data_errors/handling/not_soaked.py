@@ -30,46 +30,47 @@ class NotSoaked(Handling):
     # of its own; with the temperatures delayed after that the residuals would grow
     of_one = 3.0
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Time constants, where the temperature changes."""
         state = lot.state
         if state.temperature is None or float(np.ptp(state.temperature)) < 1.0:
             return []
         return [{"tau": float(tau)} for tau in np.geomspace(_FASTEST, _SLOWEST, _GRID)]
 
-    def near(self, lot: Lot, **place: float) -> list[dict[str, float]]:
-        """Time constants up to the neighbours in :meth:`places`."""
+    def near(self, lot: Lot, **location: float) -> list[dict[str, float]]:
+        """Time constants up to the neighbours in :meth:`locations`."""
         step = (_SLOWEST / _FASTEST) ** (1.0 / (_GRID - 1))
-        return [{**place, "tau": place["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
+        return [{**location, "tau": location["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """What being behind adds, by each unit's own coefficients: one where they are known exactly."""
         units, n = lot.state.time.shape
         if slope is None:
             return np.zeros((units, n, len(lot.state.axes), 1))
-        behind = _temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0)
+        behind = _temperature(lot.state, location["tau"]) - _temperature(lot.state, 0.0)
         return (slope * behind[..., None])[..., None]
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        behind = np.abs(_temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0))
-        alone = "unit" in place
-        behind = behind[int(place["unit"])] if alone else behind
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
+        behind = np.abs(_temperature(lot.state, location["tau"]) - _temperature(lot.state, 0.0))
+        alone = "unit" in location
+        behind = behind[int(location["unit"])] if alone else behind
         return (
-            f"{'the unit follows' if alone else 'the devices follow'} the temperature that was read with a time constant of "
-            f"{place['tau']:.0f} s, up to {float(behind.max()):.1f} K behind it; soak longer, or measure the device's temperature"
+            f"{'the unit follows' if alone else 'the devices follow'} the temperature that was read with a time constant "
+            f"of {location['tau']:.0f} s, up to {float(behind.max()):.1f} K behind it; soak longer, or measure "
+            "the device's temperature"
         )
 
-    def settled(self, lot: Lot, size: Array, misfit: Misfit, **place: float) -> Lot | None:
+    def settled(self, lot: Lot, size: Array, misfit: Misfit, **location: float) -> Lot | None:
         """With the temperatures of the devices in place of the readings, each unit's time constant found by its own dwells."""
         from scipy.optimize import minimize_scalar  # noqa: PLC0415  # a quarter of a second, and few lots need it
 
         each = np.zeros(lot.state.time.shape[0])
-        middle, reach = float(np.log(place["tau"])), float(np.log(_SPREAD))
-        for unit in [int(place["unit"])] if "unit" in place else range(each.size):
-            own = lot.units([unit])
+        middle, reach = float(np.log(location["tau"])), float(np.log(_SPREAD))
+        for unit in [int(location["unit"])] if "unit" in location else range(each.size):
+            alone = lot.units([unit])
 
-            def left(log_tau: float, own: Lot = own, unit: int = unit) -> float:
-                return misfit(replace(own, state=delayed(own.state, np.array([np.exp(log_tau)]))), (unit,))
+            def left(log_tau: float, alone: Lot = alone, unit: int = unit) -> float:
+                return misfit(replace(alone, state=delayed(alone.state, np.array([np.exp(log_tau)]))), (unit,))
 
             bounds = (middle - reach, middle + reach)
             minimum = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": _EXACT})
@@ -84,8 +85,8 @@ def delayed(state: State, tau: Array) -> State:
     history = state.history
     if history is None:
         return replace(state, temperature=_lag(state.time, state.temperature, tau), memory={})
-    whole = np.broadcast_to(history.temperature, (len(tau), history.time.size))
-    late = _lag(np.broadcast_to(history.time, whole.shape), whole, tau)
+    recorded = np.broadcast_to(history.temperature, (len(tau), history.time.size))
+    late = _lag(np.broadcast_to(history.time, recorded.shape), recorded, tau)
     each = [np.interp(t, history.time, h) for t, h in zip(state.time, late, strict=True)]
     return replace(state, temperature=np.stack(each), history=History(history.time, late), memory={})
 

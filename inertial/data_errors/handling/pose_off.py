@@ -14,7 +14,7 @@ class PoseOff(DirectionOff):
     which = "every time; its dwells are left out"
     fewest_units = 1
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Every pose with more than one dwell; none if the directions are unknown."""
         if not pose_errors(lot.state).shape[-1]:
             return []
@@ -22,5 +22,5 @@ class PoseOff(DirectionOff):
         several = number[count > 1]
         return [{"pose": float(k)} for k in several] if several.size > 3 * int(count.max() > 1) else []
 
-    def dwells(self, lot: Lot, **place: float) -> list[int]:
-        return np.flatnonzero(poses(lot) == int(place["pose"])).tolist()
+    def dwells(self, lot: Lot, **location: float) -> list[int]:
+        return np.flatnonzero(poses(lot) == int(location["pose"])).tolist()

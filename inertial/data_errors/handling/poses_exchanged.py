@@ -18,27 +18,27 @@ class PosesExchanged(Handling):
     breaker = "the log of the table, or both poses once more"
     of_one = 1.25  # a part of the way between two poses is no exchange
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Each dwell whose successor has another pose."""
         step = np.linalg.norm(np.diff(common_force(lot), axis=-2), axis=-1).max(axis=0)
         both = lot.measured[:-1] & lot.measured[1:]
         return [{"at": float(k)} for k in np.flatnonzero((step > _APART) & both)]
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
-        first, force = int(place["at"]), common_force(lot)
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
+        first, force = int(location["at"]), common_force(lot)
         column = np.zeros((*force.shape, 1))
         column[:, first, :, 0] = force[:, first + 1] - force[:, first]
         column[:, first + 1, :, 0] = force[:, first] - force[:, first + 1]
         return column
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         force = common_force(lot)[0]
-        first = int(place["at"])
+        first = int(location["at"])
         apart = np.degrees(np.arccos(np.clip(float(force[first] @ force[first + 1]), -1.0, 1.0)))
         return f"the poses of this dwell and the next, {apart:.0f}° apart, were exchanged for all units; they are exchanged back"
 
-    def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
-        first = int(place["at"])
+    def mended(self, lot: Lot, size: Array, **location: float) -> Lot | None:
+        first = int(location["at"])
         order = np.arange(lot.state.time.shape[1])
         order[[first, first + 1]] = order[[first + 1, first]]
         known = {name: getattr(lot.state, name) for name in ("outer", "inner", "heading", "force", "felt")}
@@ -49,5 +49,5 @@ class PosesExchanged(Handling):
         }
         return replace(lot, state=replace(lot.state, **turned, memory={}))
 
-    def dwells(self, lot: Lot, **place: float) -> list[int]:
-        return [int(place["at"]), int(place["at"]) + 1]
+    def dwells(self, lot: Lot, **location: float) -> list[int]:
+        return [int(location["at"]), int(location["at"]) + 1]

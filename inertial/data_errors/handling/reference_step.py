@@ -14,5 +14,5 @@ class ReferenceStep(Change):
     def addition(self, lot: Lot) -> Array:
         return common_force(lot)[..., None]
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         return f"the scale factors of all units changed by {1e6 * size[0]:+.0f} ppm; look at the reader's reference"

@@ -18,34 +18,34 @@ class SlipsUnderLoad(Handling):
     hides_behind = ("encoder_harmonic", "outer_encoder_offset")
     fewest_units = 1
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Loads of either side between those of the poses, that less than half of the dwells exceed.
 
         None where the angles are not known, or not the same for all units.
         """
         if lot.state.outer is None or lot.state.inner is None or len(common(lot.state.outer)) > 1:
             return []
-        places: list[dict[str, float]] = []
+        found: list[dict[str, float]] = []
         for side in (1.0, -1.0):
             loads = np.unique(np.round(_load(lot, side), 3))
             limits = 0.5 * (loads[1:] + loads[:-1])
             beyond = np.array([np.mean(_load(lot, side) > limit) for limit in limits])
             limits = limits[beyond < 0.5]
             limits = limits[np.unique(np.linspace(0, limits.size - 1, min(limits.size, _LOADS)).astype(int))]
-            places += [{"side": side, "load": float(limit)} for limit in limits]
-        return places
+            found += [{"side": side, "load": float(limit)} for limit in limits]
+        return found
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """What the angle adds in the poses beyond the load."""
-        return tilts(lot.state)[..., :1] * _beyond(lot, **place)[:, None, None]
+        return tilts(lot.state)[..., :1] * _overloaded(lot, **location)[:, None, None]
 
-    def dwells(self, lot: Lot, **place: float) -> list[int]:
-        """Those of the poses beyond the load."""
-        return np.flatnonzero(_beyond(lot, **place)).tolist()
+    def dwells(self, lot: Lot, **location: float) -> list[int]:
+        """The dwells of the poses beyond the load."""
+        return np.flatnonzero(_overloaded(lot, **location)).tolist()
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         """The angle, and where it is off."""
-        where = f"{'' if place['side'] > 0.0 else '-'}sin(outer) exceeds {place['load']:.2f}"
+        where = f"{'' if location['side'] > 0.0 else '-'}sin(outer) exceeds {location['load']:.2f}"
         return f"the outer angle is off by {np.degrees(size[0]):+.4f}° in the poses where {where}, for all units"
 
 
@@ -54,5 +54,6 @@ def _load(lot: Lot, side: float) -> Array:
     return side * np.sin(lot.state.need("outer", SlipsUnderLoad.id).reshape(-1, lot.state.time.shape[-1])[0])
 
 
-def _beyond(lot: Lot, **place: float) -> Flags:
-    return _load(lot, place["side"]) > place["load"]
+def _overloaded(lot: Lot, **location: float) -> Flags:
+    """Dwells (n,) whose load exceeds that of the location."""
+    return _load(lot, location["side"]) > location["load"]

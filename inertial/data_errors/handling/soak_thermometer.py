@@ -16,35 +16,35 @@ class SoakThermometer(Handling):
     breaker = "a second thermometer, or a soak at a fourth temperature"
     hides_behind = ("scale_temperature_quadratic", "bias_temperature_quadratic")
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Every soak, if there are more than two."""
         number = int(soaks(lot.state).max()) + 1
         return [{"soak": float(k)} for k in range(number)] if number > 2 else []
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The contribution of an offset of one kelvin, by each unit's own coefficients."""
         if slope is None:
             return np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
-        return -(slope * (soaks(lot.state) == int(place["soak"]))[:, None])[..., None]
+        return -(slope * (soaks(lot.state) == int(location["soak"]))[:, None])[..., None]
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        return f"the thermometers read {self.short(size, **place)}; the readings are corrected by it"
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
+        return f"the thermometers read {self.short(size, **location)}; the readings are corrected by it"
 
-    def instead(self, lot: Lot, **place: float) -> list[dict[str, float]]:
+    def instead(self, lot: Lot, **location: float) -> list[dict[str, float]]:
         """The other soaks: with three, an offset of one is one of another beside coefficients that are linear in temperature."""
         number = int(soaks(lot.state).max()) + 1
-        return [{**place, "soak": float(k)} for k in range(number) if k != int(place["soak"])]
+        return [{**location, "soak": float(k)} for k in range(number) if k != int(location["soak"])]
 
-    def short(self, size: Array, **place: float) -> str:
-        return f"{size[0]:+.2f} K off in soak {int(place['soak']) + 1}"
+    def short(self, size: Array, **location: float) -> str:
+        return f"{size[0]:+.2f} K off in soak {int(location['soak']) + 1}"
 
-    def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
+    def mended(self, lot: Lot, size: Array, **location: float) -> Lot | None:
         """With the readings of the soak lowered by the offset, of one unit or of all."""
-        state, wrong, offset = lot.state, soaks(lot.state) == int(place["soak"]), float(size[0])
+        state, wrong, offset = lot.state, soaks(lot.state) == int(location["soak"]), float(size[0])
         if state.temperature is None:
             return lot
         units = np.arange(state.time.shape[0])
-        affected = (units == place.get("unit", units))[:, None]
+        affected = (units == location.get("unit", units))[:, None]
         history = state.history
         if history is not None:
             during = (history.time >= state.time[0, wrong].min()) & (history.time <= state.time[0, wrong].max())
@@ -52,5 +52,5 @@ class SoakThermometer(Handling):
         temperature = state.temperature - offset * (affected & wrong)
         return replace(lot, state=replace(state, temperature=temperature, history=history, memory={}))
 
-    def dwells(self, lot: Lot, **place: float) -> list[int]:
-        return np.flatnonzero(soaks(lot.state) == int(place["soak"])).tolist()
+    def dwells(self, lot: Lot, **location: float) -> list[int]:
+        return np.flatnonzero(soaks(lot.state) == int(location["soak"])).tolist()

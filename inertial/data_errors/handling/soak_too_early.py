@@ -25,7 +25,7 @@ class SoakTooEarly(Handling):
     fewest_units = 1
     in_part = False
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Every soak with several time constants, if there are at least two soaks."""
         number = int(soaks(lot.state).max()) + 1
         if number < 2:
@@ -36,42 +36,42 @@ class SoakTooEarly(Handling):
             {"soak": float(k), "tau": span * share} for k, span in enumerate(spans) if span for share in shares.tolist()
         ]
 
-    def near(self, lot: Lot, **place: float) -> list[dict[str, float]]:
-        """Time constants up to the neighbours in :meth:`places`."""
+    def near(self, lot: Lot, **location: float) -> list[dict[str, float]]:
+        """Time constants up to the neighbours in :meth:`locations`."""
         step = (_SHARES[1] / _SHARES[0]) ** (1.0 / (_TAUS - 1))
-        return [{**place, "tau": place["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
+        return [{**location, "tau": location["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
 
-    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The contribution of a gap of one kelvin at the first dwell, by each unit's own coefficients."""
         if slope is None:
             return np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
-        fading = _fading(lot, lot.state.time, np.full(len(lot.state.time), place["tau"]), place["soak"])
+        fading = _fading(lot, lot.state.time, np.full(len(lot.state.time), location["tau"]), location["soak"])
         return (slope * fading[..., None])[..., None]
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         return (
-            f"soak {int(place['soak']) + 1} was measured too early: the elements began it {size[0]:+.2f} K from what was read, "
-            f"and followed with a time constant of about {place['tau']:.0f} s"
+            f"soak {int(location['soak']) + 1} was measured too early: the elements began it {size[0]:+.2f} K from what was "
+            f"read, and followed with a time constant of about {location['tau']:.0f} s"
         )
 
-    def settled(self, lot: Lot, size: Array, misfit: Misfit, **place: float) -> Lot | None:
+    def settled(self, lot: Lot, size: Array, misfit: Misfit, **location: float) -> Lot | None:
         """With the elements' temperatures in place of the readings: each unit's gap and time constant by its own dwells."""
         from scipy.optimize import minimize  # noqa: PLC0415  # a quarter of a second, and few lots need it
 
-        gaps, taus = np.full(len(lot.state.time), float(size[0])), np.full(len(lot.state.time), place["tau"])
+        gaps, taus = np.full(len(lot.state.time), float(size[0])), np.full(len(lot.state.time), location["tau"])
         for unit in range(len(gaps)):
             alone = lot.units([unit])
 
             def left(free: Array, alone: Lot = alone, unit: int = unit) -> float:
-                gap, tau = size[0] * free[0], place["tau"] * np.exp(free[1])
-                return misfit(_corrected(alone, np.array([gap]), np.array([tau]), place["soak"]), (unit,))
+                gap, tau = size[0] * free[0], location["tau"] * np.exp(free[1])
+                return misfit(_corrected(alone, np.array([gap]), np.array([tau]), location["soak"]), (unit,))
 
             best = minimize(left, [1.0, 0.0], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}).x
-            gaps[unit], taus[unit] = size[0] * best[0], place["tau"] * np.exp(best[1])
-        return _corrected(lot, gaps, taus, place["soak"])
+            gaps[unit], taus[unit] = size[0] * best[0], location["tau"] * np.exp(best[1])
+        return _corrected(lot, gaps, taus, location["soak"])
 
-    def dwells(self, lot: Lot, **place: float) -> list[int]:
-        return np.flatnonzero(soaks(lot.state) == int(place["soak"])).tolist()
+    def dwells(self, lot: Lot, **location: float) -> list[int]:
+        return np.flatnonzero(soaks(lot.state) == int(location["soak"])).tolist()
 
 
 def _fading(lot: Lot, time: Array, tau: Array, soak: float) -> Array:

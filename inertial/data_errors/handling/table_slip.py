@@ -14,12 +14,12 @@ class TableSlip(Change):
     fewest_units = 1
 
     def moments(self, lot: Lot) -> list[int]:
-        """Every place in time; none if the angles are unknown."""
+        """The dwells from which on a change is possible; none if the angles are unknown."""
         return [] if lot.state.outer is None or lot.state.inner is None else super().moments(lot)
 
     def addition(self, lot: Lot) -> Array:
         return tilts(lot.state)
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         off = f"{1e3 * size[0]:+.3f} mrad (outer) and {1e3 * size[1]:+.3f} mrad (inner)"
         return f"the table's angles changed by {off}; home it and repeat"

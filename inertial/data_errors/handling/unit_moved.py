@@ -14,5 +14,5 @@ class UnitMoved(OfOneUnit, FixtureMoved):
     hides_behind = ("misalignment_temperature",)
     fewest_units = 1
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
         return f"the unit {turned(size)}; seat it again and repeat"

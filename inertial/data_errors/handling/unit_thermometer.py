@@ -11,5 +11,5 @@ class UnitThermometer(OfOneUnit, SoakThermometer):
     equation = "−∂E/∂T·ΔT in one soak, one unit"
     fewest_units = 1
 
-    def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        return f"the thermometer of the unit reads {self.short(size, **place)}; its readings are corrected by it"
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
+        return f"the thermometer of the unit reads {self.short(size, **location)}; its readings are corrected by it"

@@ -13,12 +13,12 @@ class WrongPose(DirectionOff, OfOneDwell):
     breaker = "measure that pose again"
     which = "for all units; the dwell is left out"
 
-    def places(self, lot: Lot) -> list[dict[str, float]]:
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Every dwell; none if the directions are unknown."""
         return [{"at": float(k)} for k in np.flatnonzero(lot.measured)] if pose_errors(lot.state).shape[-1] else []
 
     def every_dwell(self, lot: Lot) -> Array:
         return pose_errors(lot.state)
 
-    def dwells(self, lot: Lot, **place: float) -> list[int]:
-        return [int(place["at"])]
+    def dwells(self, lot: Lot, **location: float) -> list[int]:
+        return [int(location["at"])]

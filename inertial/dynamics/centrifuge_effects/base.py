@@ -45,8 +45,8 @@ class CentrifugeEffect(DynamicEffect, ABC):
 
     def seen(self, points: Spins) -> bool:
         """Whether the points can show the effect besides bias and scale."""
-        own = self.column(points)
-        rest = np.column_stack([np.ones_like(own), points.acceleration])
-        size = float(np.linalg.norm(own))
-        left = own - rest @ np.linalg.lstsq(rest, own, rcond=None)[0]
+        column = self.column(points)
+        rest = np.column_stack([np.ones_like(column), points.acceleration])
+        size = float(np.linalg.norm(column))
+        left = column - rest @ np.linalg.lstsq(rest, column, rcond=None)[0]
         return size > 0.0 and float(np.linalg.norm(left)) > 1e-6 * size

@@ -28,8 +28,8 @@ class RotationEffect(DynamicEffect, ABC):
 
 def about(at: Nodes, shift: Array) -> Array:
     """Terms (3, n, 3, m) of errors (3, n, m) in rad of the turning angle, apart for outer and inner axis: (3, n, 3, 2m)."""
-    own = at.points.inner_turns[:, None] > 0
-    each = np.concatenate([np.where(own, 0.0, shift), np.where(own, shift, 0.0)], axis=-1)
+    about_inner = at.points.inner_turns[:, None] > 0
+    each = np.concatenate([np.where(about_inner, 0.0, shift), np.where(about_inner, shift, 0.0)], axis=-1)
     return at.slope[..., :, None] * each[..., None, :]
 
 
@@ -63,10 +63,10 @@ def leaning(at: Nodes, order: int) -> Array:
     """
     along_outer = of_lab(at, (1.0, 0.0, 0.0))
     along_inner = np.sin(at.outer)[..., None] * np.array([0.0, 0.0, 1.0])
-    own = at.points.inner_turns[:, None] > 0
+    about_inner = at.points.inner_turns[:, None] > 0
     wave = waves(at, order) * at.points.turning[:, None]
     outer, inner = (
         vector[..., :, None] * np.where(keep, wave, 0.0)[..., None, :]
-        for vector, keep in ((along_outer, ~own), (along_inner, own))
+        for vector, keep in ((along_outer, ~about_inner), (along_inner, about_inner))
     )
     return np.concatenate([outer, inner], axis=-1)

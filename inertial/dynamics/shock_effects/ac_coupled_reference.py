@@ -18,5 +18,5 @@ class AcCoupledReference(ShockEffect):
         return (Parameter("coupling_s", "s", 1.5 * duration_s, 3000.0 * duration_s, starts, log=True),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
-        whole = np.concatenate([[0.0], np.cumsum(0.5 * (wave[1:] + wave[:-1]))]) / rate_hz
-        return np.asarray(wave + whole / values[0])
+        integral = np.concatenate([[0.0], np.cumsum(0.5 * (wave[1:] + wave[:-1]))]) / rate_hz
+        return np.asarray(wave + integral / values[0])

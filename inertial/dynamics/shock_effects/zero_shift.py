@@ -13,5 +13,5 @@ class ZeroShift(ShockEffect):
     breaker = "shocks in the other direction, and a longer record after the pulse: the shift stays"
 
     def added(self, wave: Array, rate_hz: float) -> Array:
-        whole = np.cumsum(np.abs(wave))
-        return np.asarray(whole / whole[-1])
+        passed = np.cumsum(np.abs(wave))
+        return np.asarray(passed / passed[-1])

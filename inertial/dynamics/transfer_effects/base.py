@@ -75,11 +75,11 @@ class Conditions:
 
     def picked(self, rows: Flags) -> "Conditions":
         """Some of the points."""
-        return Conditions(*(one[rows] for one in self.columns))
+        return Conditions(*(column[rows] for column in self.columns))
 
     def along(self, frequency: Array) -> "Conditions":
         """Other frequencies (m,) in the middle of the conditions of these points."""
-        return Conditions(frequency, *(np.full(len(frequency), np.median(one)) for one in self.columns[1:]))
+        return Conditions(frequency, *(np.full(len(frequency), np.median(column)) for column in self.columns[1:]))
 
 
 class TransferEffect(DynamicEffect, ABC):

@@ -30,7 +30,7 @@ class GasDamping(TransferEffect):
         return np.ones(len(points.frequency), dtype=np.complex128)
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
-        """That of the damping ratio."""
+        """Factor (n,) of the damping ratio at the temperature of each point."""
         return {"damping": np.maximum(1.0 + values[0] * (viscosity(points.temperature) - 1.0), 1e-3)}
 
     def seen(self, points: Conditions) -> bool:

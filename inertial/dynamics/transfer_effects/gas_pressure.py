@@ -28,7 +28,7 @@ class GasPressure(TransferEffect):
         return np.ones(len(points.frequency), dtype=np.complex128)
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
-        """That of the damping ratio."""
+        """Factor (n,) of the damping ratio at the pressure of each point."""
         gap = float(values[0])
         return {"damping": _slipping(np.array([AMBIENT_HPA]), gap) / _slipping(points.pressure, gap)}
 

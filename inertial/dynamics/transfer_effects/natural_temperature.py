@@ -22,7 +22,7 @@ class NaturalTemperature(TransferEffect):
         return np.ones(len(points.frequency), dtype=np.complex128)
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
-        """That of the natural frequency."""
+        """Factor (n,) of the natural frequency at the temperature of each point."""
         return {"natural_hz": 1.0 + values[0] * (points.temperature - AMBIENT_C)}
 
     def seen(self, points: Conditions) -> bool:

@@ -109,7 +109,7 @@ def test_scatter_that_follows_the_temperature_is_not_quantised(seed: int) -> Non
     "world", [*(NULLS[n] for n in ("B30", "K8", "two_units", "many_units")), HIDDEN["third_order_2"]]
 )
 def test_no_pair_is_searched_where_no_units_were_exchanged(world: World) -> None:
-    assert UnitsSwapped().places(lot_in(make(world, 6_300_020))) == []
+    assert UnitsSwapped().locations(lot_in(make(world, 6_300_020))) == []
     assert not UnitsSwapped().possible(np.array([0.5]))
 
 
@@ -118,7 +118,7 @@ def test_units_in_each_others_seats_for_a_while_are_found_with_both_ends() -> No
     output = lot.output.copy()
     scale = np.ones((4, 3)) if lot.scale is None else lot.scale
     output[[1, 2], 20:44] = (scale[[2, 1], None] / scale[[1, 2], None] * output[[2, 1]])[:, 20:44]
-    places = UnitsSwapped().places(replace(lot, output=output))
+    places = UnitsSwapped().locations(replace(lot, output=output))
     assert {(place["unit"], place["other"]) for place in places} == {(1.0, 2.0)}
     first = places[0]
     assert (first["dwell"], first["until"]) == (20.0, 44.0)
@@ -158,7 +158,7 @@ def test_a_sensor_that_follows_the_temperature_has_no_spikes(seed: int) -> None:
 
 def test_a_bias_that_jumps_has_two_dwells_on_either_side() -> None:
     lot = lot_in(make(World(units=1), 6_300_070))
-    jumps = {place["dwell"] for place in BiasJump().places(lot)}
+    jumps = {place["dwell"] for place in BiasJump().locations(lot)}
     assert (min(jumps), max(jumps)) == (2.0, lot.state.time.shape[1] - 2.0)
 
 

@@ -22,7 +22,7 @@ def lot(outer: np.ndarray) -> Lot:
 
 def test_the_force_changes_as_by_a_table_that_stands_beside_its_reading() -> None:
     slips, made = SlipsUnderLoad(), lot(OUTER)
-    (place,) = [p for p in slips.places(made) if p["side"] > 0.0 and 0.5 < p["load"] < 0.866]
+    (place,) = [p for p in slips.locations(made) if p["side"] > 0.0 and 0.5 < p["load"] < 0.866]
     beyond = np.isin(np.rint(np.rad2deg(OUTER)), [60.0, 90.0])
     assert slips.dwells(made, **place) == np.flatnonzero(beyond).tolist()
     slipped = frames.force_from_angles(OUTER + SLIP * beyond, INNER)
@@ -33,4 +33,4 @@ def test_the_force_changes_as_by_a_table_that_stands_beside_its_reading() -> Non
 
 @pytest.mark.parametrize("outer", [np.zeros(OUTER.size), np.stack([OUTER, OUTER[::-1]])])
 def test_one_load_and_units_at_angles_of_their_own_show_no_slip(outer: np.ndarray) -> None:
-    assert SlipsUnderLoad().places(lot(outer)) == []
+    assert SlipsUnderLoad().locations(lot(outer)) == []

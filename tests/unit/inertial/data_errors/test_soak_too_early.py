@@ -62,12 +62,12 @@ def test_every_unit_has_a_gap_and_a_time_constant_of_its_own_by_its_dwells() -> 
 
 def test_it_needs_two_soaks_and_asks_for_time_constants_that_the_soak_can_show() -> None:
     early, made = SoakTooEarly(), lot()
-    places = early.places(made)
+    places = early.locations(made)
     assert {place["soak"] for place in places} == {0.0, 1.0, 2.0}
     span = (POSES - 1) * EACH_S
     assert all(0.04 * span < place["tau"] < 1.6 * span for place in places)
     still = replace(made, state=replace(made.state, temperature=np.full_like(made.state.time, 25.0), memory={}))
-    assert early.places(still) == []
+    assert early.locations(still) == []
 
 
 @pytest.mark.parametrize("soak", [0.0, 2.0])

@@ -69,14 +69,14 @@ def test_an_axis_that_wanders_by_itself_has_shares_of_its_own(seed: int) -> None
     dwells.loc[wanders, "out_y"] += 40e-6 * np.cumsum(steps)
     lot = lot_of(measured(dwells, made.history), square=False)
     noise = ExaminedRun(lot, BASE).model().noise
-    (own,) = noise.shares.own
+    (own,) = noise.shares.by_block
     assert own[0] == 3 * 2 + 1
     assert own[1] + own[2] > 30.0 * max(noise.shares.flicker + noise.shares.walk, 1.0)
 
 
 def test_equal_axes_have_the_shares_of_their_lot() -> None:
     runs = [run_of(NULLS[name], SEED_OF_SHARES + seed) for name in ("B30", "K4", "white") for seed in range(2)]
-    assert [run.model().noise.shares.own for run in runs] == [()] * 6
+    assert [run.model().noise.shares.by_block for run in runs] == [()] * 6
 
 
 def test_plausible_shares_are_those_that_the_likelihood_leaves_with_weights_that_add_up() -> None:
