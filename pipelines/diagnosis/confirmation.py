@@ -50,7 +50,7 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
     rises, reason = None, None
     if change.confirmed is True:
         # with the coefficients unchanged, less the bias of the day
-        left = [without_own_bias(problem, one.terms, residuals_of(problem, one)) for one in (old, new)]
+        left = [without_own_bias(problem, fitted.terms, residuals_of(problem, fitted)) for fitted in (old, new)]
         rises = _clear_rise("the error on the fresh run", left[0], left[1]) or _rises_left_out(
             left_out(before, also=after.terms), out
         )

@@ -73,7 +73,7 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
         },
     }
     lines = [_line(k, (bias[k], bias_u[k], float(published.bias[k])), plain, data.out_unit) for k in range(3)]
-    lines += [f"data fault {one['fault']}: {one['evidence']}" for one in verdict["blocked_by"]]
+    lines += [f"data fault {fault['fault']}: {fault['evidence']}" for fault in verdict["blocked_by"]]
     lines += [why] if why else []
     if verdict["adequate"] is False and share <= GROSS and (askew := _askew(up, down, plain.response * gravity)):
         lines.append(askew)
@@ -111,14 +111,14 @@ def _exchanged(up: Array, down: Array, gravity: float) -> str:
     means = np.concatenate([up, down])
     names = [f"{sign}{axis}" for sign in "+-" for axis in AXES]
     agreeing: list[str] = []
-    for one, other in combinations(range(len(names)), 2):
+    for first, second in combinations(range(len(names)), 2):
         order = np.arange(len(names))
-        order[[one, other]] = order[[other, one]]
+        order[[first, second]] = order[[second, first]]
         fit = faces(means[order[:3]], means[order[3:]], gravity)
         size = np.linalg.norm(fit.response, axis=1)
-        own = np.diagonal(fit.response) / size
-        if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(own)) > _OWN:
-            agreeing.append(f"{names[one]} and {names[other]}")
+        cosines = np.diagonal(fit.response) / size
+        if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(cosines)) > _OWN:
+            agreeing.append(f"{names[first]} and {names[second]}")
     return f"; with {agreeing[0]} exchanged they agree" if len(agreeing) == 1 else ""
 
 

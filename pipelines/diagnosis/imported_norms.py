@@ -93,8 +93,8 @@ def _smaller(
 
 def _bias(done: FittedNorms) -> Array:
     """Bias of every unit, (units, 3), output unit."""
-    place = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
-    return np.stack([done.fit.fit.coefficients[:, axis, k] for axis, k in enumerate(place)], axis=1)
+    columns = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
+    return np.stack([done.fit.fit.coefficients[:, axis, k] for axis, k in enumerate(columns)], axis=1)
 
 
 def _holds_at(done: FittedNorms) -> float | None:
@@ -214,15 +214,15 @@ def _bad_line(out: dict[str, Any], verdict: dict[str, Any]) -> str:
     return f"bad dwells: {names}; without them {left}; to leave them out: tumbleline fit RUN --leave-out {names}"
 
 
-def _axis_line(done: FittedNorms, spread: dict[str, Array], place: tuple[int, int], unit: str) -> str:
-    u, k = place
+def _axis_line(done: FittedNorms, spread: dict[str, Array], index: tuple[int, int], unit: str) -> str:
+    u, k = index
     level = float(done.scale[u, k]) / MICRO
     record, long = (COVERAGE * float(spread[name][u, k]) * level for name in ("bias_record_u_ug", "bias_long_u_ug"))
     whose = f"{done.measured.units[u]} " if len(done.measured.units) > 1 else ""
     later = f"± {long:.2g} over the next day" if np.isfinite(long) else "over the next day not known"
-    own = done.fit.fit
-    errors = COVERAGE * np.sqrt(np.diagonal(own.covariance[u, k]))
-    value = {name: (own.coefficients[u, k, j], errors[j]) for j, (_, name) in enumerate(own.names[k])}
+    fit = done.fit.fit
+    errors = COVERAGE * np.sqrt(np.diagonal(fit.covariance[u, k]))
+    value = {name: (fit.coefficients[u, k, j], errors[j]) for j, (_, name) in enumerate(fit.names[k])}
     scale = _stated(np.array([done.scale[u, k], value.get("K1", (0.0, 0.0))[1]]) / STANDARD_GRAVITY_M_S2)
     across = [
         f"{other} {_stated(1e3 * np.array(value[name]) / done.scale[u, k])}"

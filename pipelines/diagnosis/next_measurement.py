@@ -114,14 +114,14 @@ def rows_of(suggestion: Proposal) -> list[dict[str, Any]]:
         else:
             rows.append({**row, "repeats": 1})
         before = row
-    whole = {
+    totals = {
         "minutes": round(suggestion.minutes, 1),
         "separation_before": round(suggestion.before, 2),
         "separation_after": round(suggestion.after, 2),
         **({"separation_if": {name: round(chi, 2) for name, chi in suggestion.if_true}} if suggestion.if_true else {}),
         **({"not_parted": list(suggestion.remaining)} if suggestion.remaining else {}),
     }
-    return [{**row, **whole} for row in rows]
+    return [{**row, **totals} for row in rows]
 
 
 def _degrees(angle: float) -> float:
@@ -214,9 +214,9 @@ def _soak_for(soaks: list[dict[str, Any]], row: dict[str, Any]) -> dict[str, Any
 
 def _tidied(part: dict[str, Any], base: Recipe) -> dict[str, Any]:
     """A soak without waits and times without power of its own."""
-    kept = dict(part)
+    tidied = dict(part)
     if all(wait == base.settle_s for wait in part["waits_s"]):
-        kept["waits_s"] = None
+        tidied["waits_s"] = None
     if not any(part["off_s"]):
-        kept["off_s"] = None
-    return kept
+        tidied["off_s"] = None
+    return tidied

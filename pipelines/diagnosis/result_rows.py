@@ -70,7 +70,7 @@ def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
     return {
         term.effect.id: {"nonlinear": dict(term.values), "nonlinear_interval": between.get(term.effect.id, {})}
         for term in model.terms
-        if term.values and term.effect.id in {one.effect.id for one in added}
+        if term.values and term.effect.id in {proposed.effect.id for proposed in added}
     }
 
 
@@ -262,8 +262,8 @@ def noise_of_the_lot(model: Model, units: int) -> list[str]:
     alike = correlation_of_units(model)
     if alike < _ALIKE:
         return []
-    shared, own = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (alike, 1.0 - alike))
-    text = f"of what remains {shared} µg are alike in all {units} units, {own} µg are each unit's own"
+    shared, single = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (alike, 1.0 - alike))
+    text = f"of what remains {shared} µg are alike in all {units} units, {single} µg are each unit's own"
     return [f"{text}: look for the cause in what they share, such as table, fixture, reference or supply"]
 
 

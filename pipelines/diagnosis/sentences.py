@@ -272,16 +272,16 @@ def cost_to_decide(document: dict[str, Any]) -> list[str]:
     lines: list[str] = []
     rows = document["next_measurements"]
     for why in dict.fromkeys(row["why"] for row in rows):
-        own = [row for row in rows if row["why"] == why]
-        if not own[0].get("measurable", True) or "minutes" not in own[0]:
+        proposal = [row for row in rows if row["why"] == why]
+        if not proposal[0].get("measurable", True) or "minutes" not in proposal[0]:
             lines.append(f"To decide: {why}")
             continue
-        steps = number_of(sum(int(row.get("repeats", 1)) for row in own), "step")
+        steps = number_of(sum(int(row.get("repeats", 1)) for row in proposal), "step")
         if why.startswith(UNSEEN):
-            names, minutes = why.removeprefix(UNSEEN), short(own[0]["minutes"])
+            names, minutes = why.removeprefix(UNSEEN), short(proposal[0]["minutes"])
             lines.append(f"To see {names}, too: {steps}, {minutes} min of station time")
         else:
-            lines.append(f"To decide: {steps} for {brings(own[0])}")
+            lines.append(f"To decide: {steps} for {brings(proposal[0])}")
     return lines
 
 
