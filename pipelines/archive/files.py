@@ -180,8 +180,8 @@ def drop(folder: Place) -> None:
     """Remove the files that were written :func:`ahead`."""
     with writing(folder.parent):
         if isinstance(folder, ObjectPath):
-            for one in folder.walk():
-                one.unlink()
+            for path in folder.walk():
+                path.unlink()
         elif folder.is_dir():
             shutil.rmtree(folder)
 

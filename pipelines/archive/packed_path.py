@@ -126,14 +126,14 @@ class PackedPath(Base):
 
     def _refuse_link(self) -> None:
         """Refuse a symbolic link on the way from a top folder, which may be one to another disk, to this place."""
-        above, place = self._below_root().count("/"), str(self)
-        for _ in range(above):
-            if os.path.islink(place):
+        levels, path = self._below_root().count("/"), str(self)
+        for _ in range(levels):
+            if os.path.islink(path):
                 raise LinkInArchive(
-                    f"archive: {place} is a symbolic link to {os.readlink(place)[:200]}, what it leads to is no part of the "
+                    f"archive: {path} is a symbolic link to {os.readlink(path)[:200]}, what it leads to is no part of the "
                     "archive and is not read; replace it by the content, or remove it"
                 )
-            place = os.path.dirname(place)
+            path = os.path.dirname(path)
 
     def _packed(self) -> packs.Member | int | None:
         """The packed file of this name, or the time of the packed folder; None where no pack has it."""
@@ -166,25 +166,25 @@ class PackedPath(Base):
             return self.known.below(name)
         packed = self.known.folder(parts[0])
         start = f"{parts[1]}/" if parts[1] else ""
-        own = packed.files if packed is not None else ()
-        return {one[len(start) :].partition("/")[0] for one in own if one.startswith(start)}
+        members = packed.files if packed is not None else ()
+        return {file[len(start) :].partition("/")[0] for file in members if file.startswith(start)}
 
 
-def overlay(root: str, place: str = "") -> Path:
+def overlay(root: str, path: str = "") -> Path:
     """The place of an archive, by default its root, as a path that also finds what is packed there."""
-    return _class_of(root, os.path.abspath(root))(place or root)
+    return _class_of(root, os.path.abspath(root))(path or root)
 
 
-def with_packs(place: Place) -> Place:
+def with_packs(root: Place) -> Place:
     """The root of an archive that also finds what is packed there; one in an object store has no packs."""
-    return overlay(str(place)) if isinstance(place, Path) and not isinstance(place, PackedPath) else place
+    return overlay(str(root)) if isinstance(root, Path) and not isinstance(root, PackedPath) else root
 
 
-def member_of(place: object) -> packs.Member | None:
+def member_of(path: object) -> packs.Member | None:
     """The packed file of a place that has none by itself; None for any other place."""
-    if not isinstance(place, PackedPath) or os.path.exists(place):
+    if not isinstance(path, PackedPath) or os.path.exists(path):
         return None
-    return place._member()  # noqa: SLF001 - the question of this module
+    return path._member()  # noqa: SLF001 - the question of this module
 
 
 @cache

@@ -30,7 +30,7 @@ def stages_of(folder: Place, names: set[str] | None = None) -> list[str]:
 
 def names_in(folder: Place) -> set[str]:
     """Names of the files in a folder; an empty set where the folder does not exist."""
-    return {place.name for place in folder.iterdir()} if folder.is_dir() else set()
+    return {path.name for path in folder.iterdir()} if folder.is_dir() else set()
 
 
 START = "run.json"
@@ -172,9 +172,9 @@ class Run:
 
     def manifest(self, name: str) -> dict[str, Any]:
         """The manifest of a table."""
-        place = self.path / f"{name}.json"
-        content = files.read_json(place)
-        refuse_newer(content.get("schema"), str(place))
+        path = self.path / f"{name}.json"
+        content = files.read_json(path)
+        refuse_newer(content.get("schema"), str(path))
         return content
 
     def tables(self) -> list[str]:
@@ -201,8 +201,8 @@ class Run:
 
     def _hash_of(self, name: str) -> str:
         """Hash of a file of the run; empty where it is not there."""
-        place = self.path / name
-        return files.sha256(place) if place.is_file() else ""
+        path = self.path / name
+        return files.sha256(path) if path.is_file() else ""
 
     def _is_made_by(self, name: str, key: str) -> bool:
         path = self.path / f"{name}.parquet"

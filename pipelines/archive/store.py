@@ -164,24 +164,24 @@ class ObjectPath:
             ) from None
 
 
-def globbed(place: Any, pattern: str) -> Iterator[Any]:
+def globbed(folder: Any, pattern: str) -> Iterator[Any]:
     """What lies below a place and has such a name; every part of the pattern is one level."""
     first, _, rest = pattern.partition("/")
-    matches = [place / first]
+    matches = [folder / first]
     if any(mark in first for mark in "*?["):
-        inside = place.iterdir() if place.is_dir() else ()
-        matches = sorted(one for one in inside if fnmatchcase(one.name, first))
-    for one in matches:
+        inside = folder.iterdir() if folder.is_dir() else ()
+        matches = sorted(path for path in inside if fnmatchcase(path.name, first))
+    for path in matches:
         if rest:
-            yield from one.glob(rest)
-        elif one.exists():
-            yield one
+            yield from path.glob(rest)
+        elif path.exists():
+            yield path
 
 
 Place: TypeAlias = Path | ObjectPath
 
 
-def place_of(address: str | Path | ObjectPath) -> Place:
+def path_of(address: str | Path | ObjectPath) -> Place:
     """The folder, or the place in an object store, that an address names."""
     if isinstance(address, ObjectPath | Path):
         return address
@@ -204,9 +204,9 @@ def place_of(address: str | Path | ObjectPath) -> Place:
     return ObjectPath(system, key, scheme, address)
 
 
-def address_of(place: Place) -> str:
+def address_of(path: Place) -> str:
     """An address by which another process finds the same archive."""
-    return place.address if isinstance(place, ObjectPath) else str(place.resolve())
+    return path.address if isinstance(path, ObjectPath) else str(path.resolve())
 
 
 def first_line(problem: Exception) -> str:
