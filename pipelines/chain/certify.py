@@ -102,8 +102,8 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     # one at a time from here on: of two who certify one serial at the same moment the second is refused, and learns of the first
     with alone(ledger.root / FOLDER, wait=True):
         if not (units and reason.strip()):
-            result.left_out |= {one.serial: why for one in proposals if (why := withdrawn(ledger, one))}
-            proposals = [one for one in proposals if one.serial not in result.left_out]
+            result.left_out |= {proposal.serial: why for proposal in proposals if (why := withdrawn(ledger, proposal))}
+            proposals = [proposal for proposal in proposals if proposal.serial not in result.left_out]
             if units and result.left_out:
                 serial, why = next(iter(result.left_out.items()))
                 raise WrongUse(f"certify: unit {serial} of run {run.id}: {why}")

@@ -87,10 +87,10 @@ class LotLooks:
                 "coverage_factor": over_looks(limits.coverage_factor, looks) * guard,
             }
         )
-        own, guarded = (grade(state.evidence, rule, zero_g) for rule in (limits, wide))
+        plain, guarded = (grade(state.evidence, rule, zero_g) for rule in (limits, wide))
         fails = _failing(guarded["figures"])
-        figures = _open_figures(own["figures"], guarded["figures"], limits, state.units)
-        passed = set(own["grades"].query("outcome == 'pass'")["unit"]) - figures.keys()
+        figures = _open_figures(plain["figures"], guarded["figures"], limits, state.units)
+        passed = set(plain["grades"].query("outcome == 'pass'")["unit"]) - figures.keys()
         ratio = limits.coverage_factor * state.ratios(self.terms.asked, zero_g)
         fitted = dict(zip(state.units, ratio.tolist(), strict=True))
         reached = {unit for unit, share in fitted.items() if guard * share <= 1.0}
@@ -98,7 +98,7 @@ class LotLooks:
         ratios = [share for unit, share in fitted.items() if unit not in fails]
         worst = max(ratios, default=0.0)
         asked = _share(worst, guard, others=bool(fails)) if self.terms.asked and ratios else ""
-        lost = len(own["grades"]) - len(fitted)
+        lost = len(plain["grades"]) - len(fitted)
         not_fitted = f", {lost} not fitted" if lost else ""
         decided = f"{len(fitted) - len(undecided)} of {len(fitted)} units decided{not_fitted}"
         text = f"{asked}{decided}{_most_often(figures, undecided)}"
@@ -209,7 +209,7 @@ class _Evaluated:
 
 
 def _open_figures(
-    own: pd.DataFrame, guarded: pd.DataFrame, limits: Limits, units: Sequence[str]
+    plain: pd.DataFrame, guarded: pd.DataFrame, limits: Limits, units: Sequence[str]
 ) -> dict[str, frozenset[str]]:
     """Limited figures of the dwells that do not pass, by unit: coefficients by the guarded rule, verification by the limits' own.
 
@@ -217,7 +217,7 @@ def _open_figures(
     """
     needed = BEFORE_THE_RECORD & limits.figures.keys()
     of_fit = guarded[guarded["figure"].isin(list(OF_COEFFICIENTS))]
-    of_checks = own[~own["figure"].isin(list(OF_COEFFICIENTS))]
+    of_checks = plain[~plain["figure"].isin(list(OF_COEFFICIENTS))]
     rows = pd.concat([of_fit, of_checks]).query("outcome == 'pass'")
     left = {unit: frozenset(needed - set(rows.loc[rows["unit"] == unit, "figure"])) for unit in units}
     return {unit: names for unit, names in left.items() if names}
@@ -241,8 +241,8 @@ def _failing(figures: pd.DataFrame) -> dict[str, str]:
 
 
 def _failed(figures: pd.DataFrame) -> Iterator[tuple[str, str]]:
-    own = figures[(figures["outcome"] == "fail") & figures["figure"].isin(list(OF_COEFFICIENTS))]
-    for row in own.to_dict("records"):
+    failed = figures[(figures["outcome"] == "fail") & figures["figure"].isin(list(OF_COEFFICIENTS))]
+    for row in failed.to_dict("records"):
         unit = "" if row["unit_text"] == "1" else f" {row['unit_text']}"
         yield (
             str(row["unit"]),
