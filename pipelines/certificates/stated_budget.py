@@ -63,7 +63,7 @@ def stated_budget(run: Run, unit: str) -> StatedBudget:
             for row in sums
         ),
         decisions=tuple(row for row in figures if np.isfinite(edge(row))),
-        references=tuple(Reference.model_validate(one) for one in station.get("reference", [])),
+        references=tuple(Reference.model_validate(reference) for reference in station.get("reference", [])),
     )
 
 

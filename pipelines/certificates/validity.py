@@ -142,12 +142,17 @@ def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersed
     Earlier calibrations end where the new one begins. Later ones are ended only with ``supersede``, because otherwise a
     calibration that is written afterwards would silently replace a newer one.
     """
-    clash = [one for one in known if one.start < one.until and one.start < until and start < one.until]
-    later = [one for one in clash if one.start > start]
+    clash = [
+        calibration
+        for calibration in known
+        if calibration.start < calibration.until and calibration.start < until and start < calibration.until
+    ]
+    later = [calibration for calibration in clash if calibration.start > start]
     if later and not supersede:
-        one = later[0]
+        first = later[0]
         raise WrongUse(
-            f"certify: unit {one.serial}: {start} to {until} overlaps calibration {one.certificate} of run {one.run}, valid "
-            f"from {one.start} to {one.until}, and begins before it; choose other dates, or end that calibration with --supersede"
+            f"certify: unit {first.serial}: {start} to {until} overlaps calibration {first.certificate} of run {first.run}, "
+            f"valid from {first.start} to {first.until}, and begins before it; choose other dates, or end that calibration "
+            "with --supersede"
         )
-    return tuple(one.event.sequence for one in clash)
+    return tuple(calibration.event.sequence for calibration in clash)

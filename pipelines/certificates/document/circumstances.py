@@ -112,8 +112,8 @@ def _static_method(run: Run, recipe: dict[str, Any], lengths: str) -> str:
     """The static calibration; ``lengths``: of its dwells, s, where the run may have chosen them."""
     dwells = run.table("dwells")
     kinds = dwells["kind"].astype(str)
-    poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
-    verified = f"; verification in {kept} other poses" if kept else "; no pose was kept for verification"
+    poses, checks = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
+    verified = f"; verification in {checks} other poses" if checks else "; no pose was kept for verification"
     planned = len(recipe.get("temperatures_C") or [0])
     soaks = number_of(int(dwells["soak"].nunique()) if "soak" in dwells else planned, "temperature")
     return (
@@ -134,13 +134,13 @@ def _of_earlier_calibrations(run: Run, serial: str) -> Iterator[str]:
 def conditions_of(run: Run, serial: str, recipe: dict[str, Any], *, static: bool) -> list[content.Condition]:
     """Temperatures, supply and gravity of a unit's readings; of a static calibration those of its dwells."""
     table = run.table("dwells" if static else "readings")
-    own, conditions = table[table["unit"] == serial], []
+    rows, conditions = table[table["unit"] == serial], []
     for column, name, unit in (
         ("unit_C", "temperature of the item", "°C"),
         ("chamber_C", "temperature of the chamber", "°C"),
         ("supply_V", "supply voltage", "V"),
     ):
-        values = own[column].dropna() if column in own else []
+        values = rows[column].dropna() if column in rows else []
         if len(values):
             conditions.append(content.Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
     gravity = recipe.get("local_gravity_m_s2") or (run.about.get("mapping") or {}).get("local_gravity_m_s2")

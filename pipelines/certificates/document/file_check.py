@@ -206,10 +206,10 @@ def _archive(done: CheckedFile, root: Any, against: Against) -> None:
             "archive", "not checked", "without --archive: whether the certificate was revoked or replaced is not known"
         )
         return
-    compared, place = compare(root, done.facts, against.archive, against.laboratory), against.archive.root
+    compared, where = compare(root, done.facts, against.archive, against.laboratory), against.archive.root
     if not compared.known:
         named = f"certificate {done.facts.number} of unit {done.facts.serial}"
-        done.add("archive", "bad" if against.demanded else "not checked", f"archive {place} has no {named}")
+        done.add("archive", "bad" if against.demanded else "not checked", f"archive {where} has no {named}")
         return
     for text in compared.different:
         done.add("archive", "bad", text)
@@ -222,7 +222,7 @@ def _archive(done: CheckedFile, root: Any, against: Against) -> None:
         return
     if compared.different:
         return
-    done.add("archive", "good", f"{compared.count} texts and numbers are those of the document of archive {place}")
+    done.add("archive", "good", f"{compared.count} texts and numbers are those of the document of archive {where}")
     if compared.unproven:
         done.add("laboratory", "not checked", f"not proven by the archive: {compared.unproven}")
     elif done.path.suffix.lower() != ".pdf":  # the pages of an unsigned PDF may say anything

@@ -61,10 +61,10 @@ def not_trusted(signer: Signer, trusted: Sequence[Certificate]) -> str:
     A certificate that is among the trusted ones vouches for itself, any other must lead to one of them. It has to be valid on the
     day of the check: whoever has the key of an expired one can state any time of signing.
     """
-    now, own = datetime.now(UTC), signer.certificate
-    if outside := not_valid(own, now):
+    now, certificate = datetime.now(UTC), signer.certificate
+    if outside := not_valid(certificate, now):
         return f"{outside}, and nothing proves that it was signed before: {time_of(signer)}"
-    return "" if any(own == one for one in trusted) else _path_problem(signer, trusted, now)
+    return "" if any(certificate == anchor for anchor in trusted) else _path_problem(signer, trusted, now)
 
 
 def not_valid(certificate: Certificate, now: datetime) -> str:
@@ -91,10 +91,13 @@ def _path_problem(signer: Signer, trusted: Sequence[Certificate], moment: dateti
         return asn1.Certificate.load(certificate.public_bytes(Encoding.DER))
 
     context = certvalidator.ValidationContext(
-        trust_roots=[loaded(one) for one in trusted], moment=moment, best_signature_time=moment, allow_fetching=False
+        trust_roots=[loaded(anchor) for anchor in trusted],
+        moment=moment,
+        best_signature_time=moment,
+        allow_fetching=False,
     )
     validator = certvalidator.CertificateValidator(
-        loaded(signer.certificate), [loaded(one) for one in signer.chain], validation_context=context
+        loaded(signer.certificate), [loaded(certificate) for certificate in signer.chain], validation_context=context
     )
     errors = library("pyhanko_certvalidator.errors", EXTRA, WHERE)
     try:
