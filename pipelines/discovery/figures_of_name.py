@@ -66,18 +66,18 @@ def station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
     """Size of a column at each station and its standard error at the stated noise."""
     table = station.levels[STATION]
     out: dict[str, tuple[float, float]] = {}
-    for label, place in table.place.items():
-        information = max(float(table.information[place, at]), 1e-300)
-        out[label] = float(table.score[place, at] / information), float(1.0 / np.sqrt(information))
+    for label, row in table.place.items():
+        information = max(float(table.information[row, at]), 1e-300)
+        out[label] = float(table.score[row, at] / information), float(1.0 / np.sqrt(information))
     return out
 
 
 def without_largest(carried: Array) -> float:
     """Evidence of contributions without the two per cent that speak most."""
-    kept = np.sort(carried)[: max(1, int(0.98 * carried.size))]
+    rest = np.sort(carried)[: max(1, int(0.98 * carried.size))]
     sums = Sums.of(1, two_sided=False)
-    rms = float(np.sqrt(np.mean(kept**2))) or 1.0
-    for value in kept / rms:
+    rms = float(np.sqrt(np.mean(rest**2))) or 1.0
+    for value in rest / rms:
         sums.add(np.array([value]))
     return float(sums.log_e[0])
 

@@ -79,7 +79,7 @@ class Findings(Alarms):
     @cached_property
     def _of_sensor(self) -> list[Alarm]:
         """Open alarms of the devices' effects and of functions of the pose; those of the thermometer stand apart."""
-        of_devices = (alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.size)
+        of_devices = (alarm for alarm in self.open_alarms if alarm.index < self.state.sensor.size)
         return [alarm for alarm in of_devices if plain(alarm.driver) != OWN_TEMPCO]
 
     @cached_property
@@ -105,10 +105,10 @@ class Findings(Alarms):
             raised = {plain(a.driver) for a in alarms}
             drivers = tuple(driver for driver in name.drivers if driver in raised) or (name.drivers[0],)
             out.append(Discovery(name, since, drivers, *self._carried(name, since)))
-        return sorted(out, key=lambda one: one.since.lots)
+        return sorted(out, key=lambda discovery: discovery.since.lots)
 
-    def _places(self, effect: str) -> NDArray[np.intp]:
-        """Places of the hypotheses of an effect, of every axis."""
+    def _indices(self, effect: str) -> NDArray[np.intp]:
+        """Indices of the hypotheses of an effect on all axes, (3·columns,)."""
         k = len(self.state.columns)
         return np.concatenate([axis * k + self.pool.places(effect) for axis in range(AXES)])
 
@@ -182,9 +182,9 @@ class Findings(Alarms):
         of_thermometer = {self.effect_of(alarm) for alarm in self.of_thermometer} & set(name.effects)
         scope, because = ("thermometer", PROPORTIONAL) if of_thermometer else self._scope(found)
         driver = found.drivers[0] if name.drivers[0] not in found.drivers else name.drivers[0]
-        sums = [of for one, of in self.state.sensor.drivers.items() if plain(one) in found.drivers]
-        places = [*self._places(name.effects[0]), self.state.sensor.count + self.pool.effects.index(name.effects[0])]
-        log_e = max(float(of.log_e[places].max()) for of in sums)
+        sums = [of for driver, of in self.state.sensor.drivers.items() if plain(driver) in found.drivers]
+        indices = [*self._indices(name.effects[0]), self.state.sensor.count + self.pool.effects.index(name.effects[0])]
+        log_e = max(float(of.log_e[indices].max()) for of in sums)
         sizes = by_axis(name)
         row: DiscoveryRow = {
             "id": "",
@@ -230,7 +230,7 @@ class Findings(Alarms):
             )
         if driver not in {MEAN, DATE, SEASON}:
             return "sensor", "lots of other stations predict it; a station's own wander is no news there"
-        if self.state.sensor.shared_by_stations()[self._places(found.name.effects[0])].any():
+        if self.state.sensor.shared_by_stations()[self._indices(found.name.effects[0])].any():
             return "sensor", f"all {stations} stations show it, and they differ by less than it"
         return "sensor_or_station", f"{stations} stations are too few to exclude permanent errors of their references"
 
@@ -239,14 +239,14 @@ class Findings(Alarms):
         """Alarms of the station's own columns, the strongest of each effect and driver."""
         best: dict[tuple[str, str], Alarm] = {}
         for alarm in self.open_alarms:
-            if alarm.place >= self.state.sensor.size:
+            if alarm.index >= self.state.sensor.size:
                 key = self.effect_of(alarm), alarm.driver
-                best[key] = max(best.get(key, alarm), alarm, key=lambda one: one.log_e)
-        kept: dict[str, Alarm] = {}
+                best[key] = max(best.get(key, alarm), alarm, key=lambda alarm: alarm.log_e)
+        strongest: dict[str, Alarm] = {}
         # columns of one table are nearly the same: the strongest stands for its driver
         for alarm in sorted(best.values(), key=lambda alarm: -self.log_e(alarm)):
-            kept.setdefault(alarm.driver, alarm)
-        return sorted(kept.values(), key=lambda alarm: alarm.lots)
+            strongest.setdefault(alarm.driver, alarm)
+        return sorted(strongest.values(), key=lambda alarm: alarm.lots)
 
     def _held(self) -> list[HeldAlarm]:
         reason = "the stations differ or wander in this effect by themselves, and it is the same for a whole lot"
@@ -255,7 +255,7 @@ class Findings(Alarms):
         rows: list[HeldAlarm] = []
         for alarm in self.state.alarms:
             if held(self.state, alarm):
-                effect, _, axis = hypothesis(self.state, alarm.place)
+                effect, _, axis = hypothesis(self.state, alarm.index)
                 log_e = round(self.log_e(alarm), 2)
                 rows.append({"effect": effect, "axis": axis, "driver": alarm.driver, "log_e": log_e, "reason": reason})
         return sorted(rows, key=lambda row: -row["log_e"])
@@ -264,7 +264,7 @@ class Findings(Alarms):
         """Functions of the pose that no effect is; and, where nothing is named, every driver with an alarm."""
         rows = {of.driver: self._map_row(of) for of in self._named[1]}
         for alarm in [] if named else sorted(self._of_sensor, key=self.log_e, reverse=True):
-            effect, _, axis = hypothesis(self.state, alarm.place)
+            effect, _, axis = hypothesis(self.state, alarm.index)
             rows.setdefault(plain(alarm.driver), self._unnamed_row(plain(alarm.driver), axis, effect))
         return list(rows.values())
 
@@ -306,15 +306,15 @@ class Findings(Alarms):
         if lots < FIRST:
             return []
         between, within = state.sensor.noise
-        own = np.mean([lot.own.sum(axis=0) for lot in self.some], axis=0) * lots
+        inside = np.mean([lot.own.sum(axis=0) for lot in self.some], axis=0) * lots
         times = np.sqrt(2.0 * (state.least_needed + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
         rows: list[ReachRow] = []
-        for driver, information, noise in ((MEAN, state.sensor.information, between), ("inside lots", own, within)):
+        for driver, information, noise in ((MEAN, state.sensor.information, between), ("inside lots", inside, within)):
             seen = information > 0.0
             sizes = np.where(seen, times * noise / np.sqrt(np.where(seen, information, 1.0)) * self.pool.size, np.nan)
             for effect in self.pool.effects:
-                own_sizes = sizes[self._places(effect)]
-                there = own_sizes[np.isfinite(own_sizes) & (own_sizes > 0.0)]
+                of_effect = sizes[self._indices(effect)]
+                there = of_effect[np.isfinite(of_effect) & (of_effect > 0.0)]
                 if there.size:
                     smallest = MICRO * float(np.median(there))
                     needed = max(FIRST, int(np.ceil(lots * smallest**2)))
@@ -323,13 +323,13 @@ class Findings(Alarms):
 
     def _unseen(self) -> list[documents.UntoldEffect]:
         information = self.state.sensor.information.reshape(AXES, -1)
-        own = sum((lot.own.sum(axis=0) for lot in self.some), np.zeros(self.state.sensor.count)).reshape(AXES, -1)
+        inside = sum((lot.own.sum(axis=0) for lot in self.some), np.zeros(self.state.sensor.count)).reshape(AXES, -1)
         if len(self.state.order) < FIRST:
             return []
         alone, nowhere = "the errors of the station have the same columns", "no lot excites it"
         places = {effect: self.pool.places(effect) for effect in self.pool.effects}
         return [
-            {"effect": effect, "reason": alone if own[:, at].any() else nowhere}
+            {"effect": effect, "reason": alone if inside[:, at].any() else nowhere}
             for effect, at in places.items()
             if not information[:, at].any()
         ]

@@ -50,14 +50,15 @@ def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
 
 def levels_chart(row: DiscoveryRow) -> Chart:
     """The levels of a driver in order of size, with 95 % intervals."""
-    levels = sorted(row["levels"][:MOST_LEVELS], key=lambda one: one["size_ug"])
-    place = np.arange(len(levels), dtype=np.float64)
-    size, error = (np.array([one[key] for one in levels]) for key in ("size_ug", "u_ug"))
+    levels = sorted(row["levels"][:MOST_LEVELS], key=lambda entry: entry["size_ug"])
+    position = np.arange(len(levels), dtype=np.float64)
+    size, error = (np.array([entry[key] for entry in levels]) for key in ("size_ug", "u_ug"))
     texts = tuple(
-        f"{one['level']}: {one['size_ug']:.2f} ± {2 * one['u_ug']:.2f} µg, {one['units']} units" for one in levels
+        f"{entry['level']}: {entry['size_ug']:.2f} ± {2 * entry['u_ug']:.2f} µg, {entry['units']} units"
+        for entry in levels
     )
-    traces = (level(place, 0.0), Trace("95 % interval", place, size, error=1.96 * error, size=7.0, texts=texts))
-    axis = PlotAxis(row["driver"], names=tuple(one["level"] for one in levels))
+    traces = (level(position, 0.0), Trace("95 % interval", position, size, error=1.96 * error, size=7.0, texts=texts))
+    axis = PlotAxis(row["driver"], names=tuple(entry["level"] for entry in levels))
     plot = Plot("", axis, PlotAxis(f"{row['recommended']} in a dwell / µg"), traces)
     return Chart(f"{row['recommended']} by {row['driver']}", (plot,), height=280)
 
@@ -112,8 +113,8 @@ def strongest_chart(findings: Findings) -> Chart | None:
     for name, sums in state.sensor.drivers.items():
         column = drivers.index(name.removesuffix(INSIDE))
         # what counts from more evidence on is drawn by as much less
-        for place, log_e in enumerate(sums.log_e - state.needed(name) + state.least_needed):
-            row = effects.index(hypothesis(state, place)[0])
+        for index, log_e in enumerate(sums.log_e - state.needed(name) + state.least_needed):
+            row = effects.index(hypothesis(state, index)[0])
             grid[row, column] = max(grid[row, column], log_e / np.log(10.0))
     if grid.max(initial=0.0) <= FAINT:
         return None

@@ -18,12 +18,12 @@ PROPORTIONAL = (
 
 def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
     """What changes the force itself, for all units of a lot alike."""
-    effect, column, _ = hypothesis(known.state, alarm.place)
-    at = alarm.place - known.state.sensor.size
+    effect, column, _ = hypothesis(known.state, alarm.index)
+    at = alarm.index - known.state.sensor.size
     station = known.state.station
     sizes = station_sizes(station, at)
     of_driver = [a for a in known.open_alarms if a.driver == alarm.driver]
-    alike = [known.effect_of(a) for a in of_driver if a.place >= known.state.sensor.size]
+    alike = [known.effect_of(a) for a in of_driver if a.index >= known.state.sensor.size]
     scale = float(station.noise[0][at])
     values = np.array([value for value, _ in sizes.values()])
     size, reach = float(np.sqrt(np.mean(values**2))), 2.0 * max(scale * error for _, error in sizes.values())

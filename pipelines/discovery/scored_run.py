@@ -61,11 +61,11 @@ def scored_runs(part: tuple[str, Sequence[str]]) -> list[ScoredRun]:
     (address, ids), out = part, list[ScoredRun]()
     archive = Archive(address)
     with threadpool_limits(1):
-        for one in ids:
+        for run_id in ids:
             try:
-                out.append(_scored(Run(archive, one)))
+                out.append(_scored(Run(archive, run_id)))
             except ArchiveUnusable as problem:
-                LOGGER.warning("discover: run %s is not pooled: %s", one, problem)
+                LOGGER.warning("discover: run %s is not pooled: %s", run_id, problem)
     return out
 
 
@@ -97,7 +97,7 @@ def _scored(run: Run) -> ScoredRun:
         if len(lot.state.axes) < 3:
             return ScoredRun(**head, left_out="its devices have fewer than three axes")
         faulty = {fault.unit for fault in faults}
-        units = tuple(one for place, one in enumerate(measurement.units) if place not in faulty)
+        units = tuple(unit for row, unit in enumerate(measurement.units) if row not in faulty)
         return _kept(head, units, slots, scores_of(lot, effects))
     except (InertialError, DataRejected, RecipeInvalid) as problem:
         return ScoredRun(**head, left_out=str(problem).rstrip("."))
