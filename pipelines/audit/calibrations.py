@@ -132,10 +132,10 @@ def _scale_in_ppm(loaded: Calibrations) -> Calibrations:
     values, errors = np.array(loaded.values), np.array(loaded.errors)
     for column in (k for k, name in enumerate(NAMES) if FAMILY_OF[name] == "scale"):
         for device in np.unique(loaded.device.astype(str)):
-            own = loaded.device == device
-            finite = np.isfinite(values[own, column])
+            rows = loaded.device == device
+            finite = np.isfinite(values[rows, column])
             if finite.any():
-                nominal = float(np.median(values[own, column][finite]))
-                values[own, column] = 1e6 * (values[own, column] / nominal - 1.0)
-                errors[own, column] = 1e6 * errors[own, column] / abs(nominal)
+                nominal = float(np.median(values[rows, column][finite]))
+                values[rows, column] = 1e6 * (values[rows, column] / nominal - 1.0)
+                errors[rows, column] = 1e6 * errors[rows, column] / abs(nominal)
     return replace(loaded, values=values, errors=errors)

@@ -57,11 +57,11 @@ def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: fl
     spans = spans_of(calibrations, pairs)
     for device in np.unique(calibrations.device.astype(str)):
         drifts = (_kind_drift(calibrations, pairs, spans, device, name, rules, since) for name in OWN)
-        own = [drift for drift in drifts if drift is not None]
+        found = [drift for drift in drifts if drift is not None]
         months = float("nan")
-        if all(one.known for one in own):
-            months = _reliable_months(calibrations, pairs, own, rules.reliability_target)
-        out += [replace(one, reliable_months=months if np.isfinite(one.tolerance) else float("nan")) for one in own]
+        if all(drift.known for drift in found):
+            months = _reliable_months(calibrations, pairs, found, rules.reliability_target)
+        out += [replace(drift, reliable_months=months if np.isfinite(drift.tolerance) else np.nan) for drift in found]
     return out
 
 

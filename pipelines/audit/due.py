@@ -48,7 +48,7 @@ class Certificates:
 
     def __len__(self) -> int:
         """Number of calibrations."""
-        return sum(len(own) for own in self.of.values())
+        return sum(len(calibrations) for calibrations in self.of.values())
 
     def standing(self, device: str, serial: str, run: str) -> CertificateState | None:
         """The state of a unit; None for a unit that was never certified.
@@ -60,7 +60,7 @@ class Certificates:
         known = self.of.get((device, serial), ())
         if not known:
             return None
-        entered = any(self._measured(one.run) == self._measured(run) for one in known)
+        entered = any(self._measured(calibration.run) == self._measured(run) for calibration in known)
         held, last = self._deciding(known)
         if held is None and last.state == "revoked":
             return CertificateState(last.certificate, "revoked", _end(last), entered)
@@ -69,9 +69,17 @@ class Certificates:
 
     def _deciding(self, known: Sequence[Calibration]) -> tuple[Calibration | None, Calibration]:
         """The calibration that is due first: of a subject without a valid one the last, else the valid one that ends first."""
-        named = dict.fromkeys(subject for one in known for subject in one.event.covers.split())
-        subjects = ([one for one in known if subject in one.event.covers.split()] for subject in named)
-        pairs = [(held := next((one for one in own if one.holds(self.day)), None), held or own[-1]) for own in subjects]
+        named = dict.fromkeys(subject for calibration in known for subject in calibration.event.covers.split())
+        subjects = (
+            [calibration for calibration in known if subject in calibration.event.covers.split()] for subject in named
+        )
+        pairs = [
+            (
+                held := next((calibration for calibration in of_subject if calibration.holds(self.day)), None),
+                held or of_subject[-1],
+            )
+            for of_subject in subjects
+        ]
         return next((pair for pair in pairs if pair[0] is None), min(pairs, key=lambda pair: pair[1].until))
 
     def _measured(self, run: str) -> str:
@@ -91,8 +99,8 @@ def certificates_of(root: Place, until: float, captures: Mapping[str, str]) -> C
     histories = histories_of(root)
     of: dict[tuple[str, str], list[Calibration]] = {}
     for events in histories.units:
-        for one in calibrations_of(event for event in events if event.when[:10] <= day):
-            of.setdefault((one.event.device.upper(), one.serial), []).append(one)
+        for calibration in calibrations_of(event for event in events if event.when[:10] <= day):
+            of.setdefault((calibration.event.device.upper(), calibration.serial), []).append(calibration)
     return Certificates(day, of, captures, histories.problems)
 
 
@@ -158,8 +166,8 @@ def last_measured(calibrations: Calibrations, due_units: Due, station: str) -> D
     """The units whose last measurement was on a station; all without a station. Earlier measurements count as history."""
     if not station:
         return due_units
-    own = calibrations.station[due_units.row] == station
-    return Due(*(getattr(due_units, name)[own] for name in Due.__dataclass_fields__))
+    on_station = calibrations.station[due_units.row] == station
+    return Due(*(getattr(due_units, name)[on_station] for name in Due.__dataclass_fields__))
 
 
 def uncertified(calibrations: Calibrations, due_units: Due, certificates: Certificates) -> Index:
@@ -173,17 +181,18 @@ def _by_certificate(calibrations: Calibrations, due_units: Due, certificates: Ce
     """Replace the interval of every unit by the state of its certificate."""
     for k, row in enumerate(due_units.row):
         names = (str(column[row]) for column in (calibrations.device, calibrations.unit, calibrations.run))
-        one = certificates.standing(*names)
-        if one is None:
+        standing = certificates.standing(*names)
+        if standing is None:
             continue
-        due_units.certificate[k], due_units.entered[k] = one.certificate, one.entered
-        due_units.valid[k] = one.state == "valid"
+        due_units.certificate[k], due_units.entered[k] = standing.certificate, standing.entered
+        due_units.valid[k] = standing.state == "valid"
         # measured again after its end: the interval counts from the measurement
-        if not due_units.valid[k] and not one.entered:
+        if not due_units.valid[k] and not standing.entered:
             continue
-        if due_units.because[k] == "drift" and one.state != "revoked" and due_units.day[k] < one.until:
+        if due_units.because[k] == "drift" and standing.state != "revoked" and due_units.day[k] < standing.until:
             continue
-        due_units.day[k], due_units.because[k] = one.until, "revoked" if one.state == "revoked" else "certificate"
+        due_units.day[k] = standing.until
+        due_units.because[k] = "revoked" if standing.state == "revoked" else "certificate"
 
 
 def _by_drift(
@@ -202,8 +211,8 @@ def _by_drift(
             of_kind[kind.device] = min(of_kind.get(kind.device, np.inf), kind.reliable_months)
     for k, row in enumerate(last):
         device = str(calibrations.device[row])
-        own = [(d.reliable_day - d.day) / MONTH_D for d in units.get(f"{device} {calibrations.unit[row]}", ())]
-        reliable = min(own, default=of_kind.get(device, np.nan))
+        forecasts = [(d.reliable_day - d.day) / MONTH_D for d in units.get(f"{device} {calibrations.unit[row]}", ())]
+        reliable = min(forecasts, default=of_kind.get(device, np.nan))
         if np.isfinite(reliable):
             months[k] = np.clip(np.floor(reliable), rules.shortest_months, rules.longest_months)
             because[k] = "drift"

@@ -76,10 +76,10 @@ def parameters_of(
         columns = zip(texts.values(), words, strict=True)
         if not all(word in known for (known, _), word in columns):
             return nothing, nothing
-        places = [numbers == known.index(word) for (known, numbers), word in zip(texts.values(), words, strict=True)]
-        own = np.flatnonzero(places[0] & places[1] & places[2])
+        same = [numbers == known.index(word) for (known, numbers), word in zip(texts.values(), words, strict=True)]
+        chosen = np.flatnonzero(same[0] & same[1] & same[2])
         value_and_error = nothing.copy(), nothing.copy()
-        value_and_error[0][row[own]], value_and_error[1][row[own]] = value[own], error[own]
+        value_and_error[0][row[chosen]], value_and_error[1][row[chosen]] = value[chosen], error[chosen]
         return value_and_error
 
     scale = [pick("scale", "K1", axis) for axis in AXES]

@@ -120,14 +120,14 @@ def abilities(calibrations: Calibrations, figures: Figures) -> tuple[list[Abilit
     able, differences = list[Ability](), list[Difference]()
     for kind in np.unique(device):
         for name in np.unique(figures.figure[device == kind].astype(str)):
-            own = np.flatnonzero((device == kind) & (figures.figure == name) & np.isfinite(figures.value))
-            if own.size < FEWEST or np.ptp(figures.value[own]) == 0.0:
+            rows = np.flatnonzero((device == kind) & (figures.figure == name) & np.isfinite(figures.value))
+            if rows.size < FEWEST or np.ptp(figures.value[rows]) == 0.0:
                 continue
-            limit = figures.limit[own]
+            limit = figures.limit[rows]
             if np.isfinite(limit).any():
-                able.append(_ability(kind, name, figures, own[np.isfinite(limit)], lot))
+                able.append(_ability(kind, name, figures, rows[np.isfinite(limit)], lot))
             for by, numbers in groups.items():
-                comparison = _compared(figures.value[own], numbers[own] - numbers[own].min(), lot[own], by)
+                comparison = _compared(figures.value[rows], numbers[rows] - numbers[rows].min(), lot[rows], by)
                 if comparison is not None:
                     differences.append(Difference(kind, name, by, comparison, comparison.rank_p))
     adjusted = holm(np.array([d.p for d in differences])) if differences else []
@@ -151,19 +151,19 @@ def _first_of_each(calibrations: Calibrations, figures: Figures) -> Figures:
     return Figures(*(getattr(figures, name)[first] for name in Figures.__dataclass_fields__))
 
 
-def _ability(device: str, figure: str, figures: Figures, own: Index, lot: Index) -> Ability:
-    values, limit = figures.value[own], float(np.median(figures.limit[own]))
+def _ability(device: str, figure: str, figures: Figures, rows: Index, lot: Index) -> Ability:
+    values, limit = figures.value[rows], float(np.median(figures.limit[rows]))
     two_sided = bool((values < 0.0).any())
     low = -limit if two_sided else -np.inf
     mean, sigma = float(values.mean()), float(values.std(ddof=1))
-    within, dof = sigma_within(values, lot[own])
+    within, dof = sigma_within(values, lot[rows])
     shape = (0.0, 3.0) if two_sided else shape_of(values)
-    outside = int(np.count_nonzero(np.abs(values) > figures.limit[own]))
+    outside = int(np.count_nonzero(np.abs(values) > figures.limit[rows]))
     return Ability(
-        device, figure, str(figures.unit_text[own[0]]), limit, two_sided, own.size, float(np.median(values)),
-        cpk(mean, sigma, low, limit, *independent(values, lot[own]), shape),
+        device, figure, str(figures.unit_text[rows[0]]), limit, two_sided, rows.size, float(np.median(values)),
+        cpk(mean, sigma, low, limit, *independent(values, lot[rows]), shape),
         cpk(mean, within, low, limit, dof + 1, None, shape) if dof >= FEWEST and within > 0.0 else None,
-        fraction_interval(outside, own.size),
+        fraction_interval(outside, rows.size),
     )  # fmt: skip
 
 

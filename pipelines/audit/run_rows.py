@@ -87,10 +87,10 @@ def rows_of_runs(run_files: Iterable[RunFiles]) -> dict[str, pa.Table]:
         except (OSError, ValueError, KeyError, TypeError, ArchiveUnusable) as trouble:  # ArrowInvalid is a ValueError
             problem = problem or first_line(trouble)
         lines.append(_line(files, about, problem))
-    kept = {"units": "grades", "coefficients": "coefficients", "figures": "figures"}
+    sources = {"units": "grades", "coefficients": "coefficients", "figures": "figures"}
     return {
         "runs": _from_rows(lines, SCHEMAS["runs"]),
-        **{name: _together(runs, table, SCHEMAS[name]) for name, table in kept.items()},
+        **{name: _together(runs, table, SCHEMAS[name]) for name, table in sources.items()},
         "parameters": _parameters([run for run in runs if len(run.tables.get("coefficients", ()))]),
         "station": _from_rows([row for run in runs for row in _station(run)], SCHEMAS["station"]),
     }
@@ -163,12 +163,12 @@ def _line(files: RunFiles, about: Mapping[str, Any], problem: str) -> tuple[str,
 
 def _together(runs: Sequence[_Run], name: str, schema: pa.Schema) -> pa.Table:
     """One table of all runs, with the run in front."""
-    own = [run for run in runs if name in run.tables]
-    if not own:
+    having = [run for run in runs if name in run.tables]
+    if not having:
         return schema.empty_table()
-    whole = pa.concat_tables([run.tables[name] for run in own])
-    names = np.repeat(np.array([run.id for run in own], dtype=object), [len(run.tables[name]) for run in own])
-    return whole.add_column(0, "run", pa.array(names, _TEXT)).cast(schema)
+    table = pa.concat_tables([run.tables[name] for run in having])
+    names = np.repeat(np.array([run.id for run in having], dtype=object), [len(run.tables[name]) for run in having])
+    return table.add_column(0, "run", pa.array(names, _TEXT)).cast(schema)
 
 
 def _parameters(runs: Sequence[_Run]) -> pa.Table:
