@@ -73,7 +73,7 @@ def _styled(outcome: str, grade: str) -> Text:
 def _reason(row: dict[str, Any]) -> str:
     """The reasons that only one of the runs gives."""
     before, after = (set(filter(None, plain_reason(text).split("; "))) for text in row["reasons"])
-    gone, new = (sorted(one.split(":")[0] for one in part) for part in (before - after, after - before))
+    gone, new = (sorted(reason.split(":")[0] for reason in part) for part in (before - after, after - before))
     changes = [f"now {name}" for name in new] + [f"no longer {name}" for name in gone if name not in new]
     return "; ".join(changes)
 
@@ -95,7 +95,7 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
     if lines:
         heads = ["unit", what, "a", "b", "change", "over\nu(a)", "over\nu(b)"]
         title = f"{what}: {len(both)} differ, largest change relative to the uncertainty first"
-        print_table(heads, lines, title=title, whole=2)
+        print_table(heads, lines, title=title, fixed=2)
     new, gone = _apart(rows, "b"), _apart(rows, "a")
     for side, names in (("only in b", new), ("only in a", gone)):
         if names:

@@ -80,7 +80,7 @@ def _refuse_nothing(audited: Audit, root: str) -> None:
         ("--station", audited.scope.station, audited.all.station),
     ):
         if name and len(audited.all) and name not in there:
-            known = [str(one) for one in np.unique(there.astype(str))]
+            known = [str(label) for label in np.unique(there.astype(str))]
             raise WrongUse(f"audit: {switch} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
     if not len(audited.all) and not audited.problems:
         raise WrongUse(

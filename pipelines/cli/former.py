@@ -175,11 +175,11 @@ def _rule(rules: dict[str, str], option: str, value: str) -> str | None:
 
 def _add(words: list[str], option: str, text: str) -> None:
     """Add a text to the value of an option, which is appended where it is not there."""
-    for place, word in enumerate(words):
-        if word == option and place + 1 < len(words):
-            words[place + 1] += text
+    for index, word in enumerate(words):
+        if word == option and index + 1 < len(words):
+            words[index + 1] += text
             return
         if word.startswith(f"{option}="):
-            words[place] += text
+            words[index] += text
             return
     words += [option, text]

@@ -120,11 +120,11 @@ def command(
     improvement = Improvement(data, tables, model, target, beside, who, fresh, attendant)
     document = improvement.run(judged, list(names_in(choose)), yes=yes)
     given = Given(archive, fresh, fresh_temperatures, leave_out, effect_file or ())
-    kept = [*(["--output", str(output)] if output else []), *(["--who", who] if who else [])]
-    document["next"] = next_lines(document, (model, target), partial(judged_data, data, beside, given), given, kept)
+    repeated = [*(["--output", str(output)] if output else []), *(["--who", who] if who else [])]
+    document["next"] = next_lines(document, (model, target), partial(judged_data, data, beside, given), given, repeated)
     if recording is not None:
         document["recording"] = recording
-        document["next"] = next_of_recording(document, given, ["--model", str(model)] if model else [], kept)
+        document["next"] = next_of_recording(document, given, ["--model", str(model)] if model else [], repeated)
     show = print_recording if brief else print_improvement
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 

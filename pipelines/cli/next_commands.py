@@ -132,9 +132,9 @@ def extension(
     start = ["--effects", ",".join(judged), *data.given.written] if new else []
     lines = [
         command_line(
-            "extend", str(file), name, *(start if place == 0 else []), "--dwells", data.source, *data.given.effects
+            "extend", str(file), name, *(start if number == 0 else []), "--dwells", data.source, *data.given.effects
         )
-        for place, name in enumerate(effects)
+        for number, name in enumerate(effects)
     ]
     return [*lines, *fresh_measurement(file, data)]
 
@@ -170,8 +170,8 @@ def print_next_of_diagnosis(document: dict[str, Any], find: FindData, model: Pat
     data = find()
     lines: list[str] = []
     if decides and data.refusal is not None:  # dwells of a file do not state the recipe that they were measured with
-        own = ["--model", str(model)] if model else ["--effects", ",".join(document["effects"])]
-        lines.append(command_line("diagnose", data.source, *own, *data.options, "--output", free_name("next")))
+        model_option = ["--model", str(model)] if model else ["--effects", ",".join(document["effects"])]
+        lines.append(command_line("diagnose", data.source, *model_option, *data.options, "--output", free_name("next")))
     elif decides:
         say(
             "To write these steps as a recipe, add --output FILE.toml --recipe RECIPE, the recipe of these dwells.",

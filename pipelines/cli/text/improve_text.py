@@ -57,19 +57,19 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
         for key, text in ERRORS.items()
         if any(row[key] is not None for row in rows)
     ]
-    print_table(["error, µg rms", *heads], lines, title="Error by version of the model", whole=0)
+    print_table(["error, µg rms", *heads], lines, title="Error by version of the model", fixed=0)
     for row in rows[1:]:
         style = {True: "bold green", False: "bold red", None: "yellow"}[row["confirmed"]]
         say(f"{', '.join(row['added'])}: {row['text']}", style=style)
 
 
 def next_lines(
-    document: dict[str, Any], files: tuple[Path | None, Path], find: FindData, given: Given, kept: Sequence[str]
+    document: dict[str, Any], files: tuple[Path | None, Path], find: FindData, given: Given, repeated: Sequence[str]
 ) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
     files : the model that was judged, None for a list of effects, and the one to write
-    kept : options of ``improve`` that name the file to write and the author, as they were given
+    repeated : options of ``improve`` that name the file to write and the author, as they were given
     """
     from pipelines.cli.history import removal
 
@@ -81,8 +81,8 @@ def next_lines(
         return []
     data = find()
     judged = target if document["added"] else model
-    own = ["--model", str(judged)] if judged else ["--effects", ",".join(document["effects"])]
-    again = ["improve", data.source, *own, *data.options, *([] if data.measure else data.again), *kept]
+    model_option = ["--model", str(judged)] if judged else ["--effects", ",".join(document["effects"])]
+    again = ["improve", data.source, *model_option, *data.options, *([] if data.measure else data.again), *repeated]
     if left:
         names = (left[0]["effect"], *left[0]["not_separated_from"])
         return [command_line(*again, "--effect", name) for name in names]
@@ -99,12 +99,12 @@ STYLES = ("cyan", "green", "magenta")
 
 def print_recording(document: dict[str, Any]) -> None:
     """Print an improvement that began with a recording."""
-    one, judged = document["recording"], document["after"] or document["diagnosis"]
-    _recognised(one)
+    recording, judged = document["recording"], document["after"] or document["diagnosis"]
+    _recognised(recording)
     print_verdict(judged)
     if not document["added"]:  # residuals and coefficients are those of the model of the import
-        _picture(one)
-    for line in one["lines"]:
+        _picture(recording)
+    for line in recording["lines"]:
         if line.startswith("CHECK") or (": bias" in line and not document["added"]):
             say(f"  {line}", style="yellow" if line.startswith("CHECK") else "")
     for text in filter(None, (sentences.evidence_text(judged), sentences.undetected(judged))):
@@ -115,10 +115,12 @@ def print_recording(document: dict[str, Any]) -> None:
     print_next(document["next"])
 
 
-def next_of_recording(document: dict[str, Any], given: Given, model: Sequence[str], kept: Sequence[str]) -> list[str]:
+def next_of_recording(
+    document: dict[str, Any], given: Given, model: Sequence[str], repeated: Sequence[str]
+) -> list[str]:
     """The commands to give next: the fit of a changed model; without faulty dwells, else the coefficients, else the diagnosis.
 
-    model, kept : options of ``improve``: the model that was judged; the file to write and the author
+    model, repeated : options of ``improve``: the model that was judged; the file to write and the author
     """
     data = JudgedData(document["recording"]["run"], "", given.fresh, given.fresh_history, given=given)
     run, words = data.source, archive_words(given.archive)
@@ -127,13 +129,13 @@ def next_of_recording(document: dict[str, Any], given: Given, model: Sequence[st
     if document["next"]:
         return document["next"]
     judged = document["after"] or document["diagnosis"]
-    left = [f"{one['unit']}:{one['dwell']}" for one in (judged["leave_out"] or {"dwells": []})["dwells"]]
+    left = [f"{entry['unit']}:{entry['dwell']}" for entry in (judged["leave_out"] or {"dwells": []})["dwells"]]
     for fault in judged["blocked_by"]:
         left += [f"{unit}:{dwell}" for unit in fault["units"] for dwell in fault["dwells"]]
     if left:
         without = replace(given, leave_out=",".join(dict.fromkeys([*filter(None, [given.leave_out]), *left])))
-        own = [*model, *replace(data, given=without).options, *data.again, *kept]
-        return [command_line("improve", run, *own)]
+        option_words = [*model, *replace(data, given=without).options, *data.again, *repeated]
+        return [command_line("improve", run, *option_words)]
     if document["recording"]["fit"] is None and judged["adequate"] is not False:
         return [command_line("fit", run, "--effects", ",".join(document["effects"]), *words)]
     if judged["adequate"]:
@@ -141,21 +143,25 @@ def next_of_recording(document: dict[str, Any], given: Given, model: Sequence[st
     return [command_line("diagnose", run, "--all", *model, *data.options)]
 
 
-def _recognised(one: dict[str, Any]) -> None:
-    rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
-    axes = ", ".join(one["columns"][axis] for axis in "xyz")
-    say(f"{', '.join(one['files'])}: {one['form']}, {one['rows']} rows{rate}; {number_of(one['dwells'], 'dwell')}")
-    say(f"  x, y, z: {axes} ({one['reason']}); in {one['output_unit']}: {one['output_reason']}", style="dim")
-    for text in [*one["assumed"], *one["remarks"]][:MOST_REMARKS]:
+def _recognised(recording: dict[str, Any]) -> None:
+    rate = "" if recording["rate_hz"] is None else f", {recording['rate_hz']:.5g} Hz"
+    axes = ", ".join(recording["columns"][axis] for axis in "xyz")
+    rows = f"{recording['rows']} rows{rate}; {number_of(recording['dwells'], 'dwell')}"
+    say(f"{', '.join(recording['files'])}: {recording['form']}, {rows}")
+    say(
+        f"  x, y, z: {axes} ({recording['reason']}); in {recording['output_unit']}: {recording['output_reason']}",
+        style="dim",
+    )
+    for text in [*recording["assumed"], *recording["remarks"]][:MOST_REMARKS]:
         say(f"  {text}", style="dim")
-    say(one["command"])
-    say(f"  kept as run {one['run']}", style="dim")
+    say(recording["command"])
+    say(f"  kept as run {recording['run']}", style="dim")
 
 
-def _picture(one: dict[str, Any]) -> None:
+def _picture(recording: dict[str, Any]) -> None:
     """The residual of the norm by dwell, or the drift of the outputs of one pose."""
-    rows = one["dwell_list"]
-    if len(rows) < 3 or one["fit"] == "faces" or _POSED & set(one["columns"]):
+    rows = recording["dwell_list"]
+    if len(rows) < 3 or recording["fit"] == "faces" or _POSED & set(recording["columns"]):
         return
     times = [0.5 * (row["start_s"] + row["end_s"]) for row in rows]
     if rows[0]["residual_ug"] is not None:
@@ -163,7 +169,7 @@ def _picture(one: dict[str, Any]) -> None:
         lines = [Line("residual", "cyan", [(t, unit * row["residual_ug"]) for t, row in zip(times, rows, strict=True)])]
     else:
         first = rows[0]["mean"]
-        title = f"output since the first block, thousandths of {one['output_unit']}"
+        title = f"output since the first block, thousandths of {recording['output_unit']}"
         lines = [
             Line(axis, style, [(t, 1e3 * (row["mean"][k] - first[k])) for t, row in zip(times, rows, strict=True)])
             for k, (axis, style) in enumerate(zip("xyz", STYLES, strict=True))
