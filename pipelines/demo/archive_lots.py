@@ -137,8 +137,8 @@ def _wander(rng: np.random.Generator, time: Array) -> Array:
     for tau in _TAU_S:
         state = rng.standard_normal(3)
         for k in range(time.size):
-            kept = math.exp(-(time[k] - time[k - 1]) / tau) if k else 1.0
-            state = kept * state + math.sqrt(1.0 - kept**2) * rng.standard_normal(3)
+            correlation = math.exp(-(time[k] - time[k - 1]) / tau) if k else 1.0
+            state = correlation * state + math.sqrt(1.0 - correlation**2) * rng.standard_normal(3)
             total[k] += state
     return total / math.sqrt(len(_TAU_S))
 

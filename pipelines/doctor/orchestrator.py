@@ -106,15 +106,15 @@ def _authenticated(address: str) -> list[Check]:
 
 
 def _version(body: str) -> Check:
-    own = metadata.version("prefect")
+    installed = metadata.version("prefect")
     try:
         found = str(json.loads(body))
     except ValueError:
         found = "no version"
-    if found == own:
+    if found == installed:
         return Check(PART, "version", "good", found)
     remedy = "install one version of Prefect on the server and here"
-    return Check(PART, "version", "warning", f"the server has {found}", f"{own}, as here", remedy)
+    return Check(PART, "version", "warning", f"the server has {found}", f"{installed}, as here", remedy)
 
 
 def _in_clear(address: str) -> list[Check]:

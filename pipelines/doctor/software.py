@@ -31,7 +31,11 @@ def _python() -> Check:
     if version not in SpecifierSet(needed, prereleases=True):
         return Check(PART, "Python", "fault", version, needed, "install the product in an environment of that version")
     classes = metadata.metadata(PRODUCT).get_all("Classifier") or ()  # the versions that the tests have run on
-    tested = [one.rpartition(" :: ")[2] for one in classes if one.startswith("Programming Language :: Python :: 3.")]
+    tested = [
+        classifier.rpartition(" :: ")[2]
+        for classifier in classes
+        if classifier.startswith("Programming Language :: Python :: 3.")
+    ]
     if version.rpartition(".")[0] not in tested:
         remedy = "install the product in an environment of one of these where it is validated"
         needed = f"{', '.join(tested)}, which the tests run on"
@@ -100,16 +104,16 @@ def _optional() -> Check:
     have: list[str] = []
     lack: list[str] = []
     for extra in sorted(set(metadata.metadata(PRODUCT).get_all("Provides-Extra") or ()) - DEVELOPMENT):
-        own = [
-            one
-            for one in declared
-            if one.marker is not None
-            and not one.marker.evaluate({"extra": ""})
-            and one.marker.evaluate({"extra": extra})
-            and canonicalize_name(one.name) != PRODUCT
+        requirements = [
+            requirement
+            for requirement in declared
+            if requirement.marker is not None
+            and not requirement.marker.evaluate({"extra": ""})
+            and requirement.marker.evaluate({"extra": extra})
+            and canonicalize_name(requirement.name) != PRODUCT
         ]
-        if own:
-            (have if all(_installed(one.name) for one in own) else lack).append(extra)
+        if requirements:
+            (have if all(_installed(requirement.name) for requirement in requirements) else lack).append(extra)
     if not have and not lack:
         remedy = "install the product again, so that its metadata are those of its code"
         return Check(PART, "optional parts", "warning", "the metadata name none", "the extras of this version", remedy)
