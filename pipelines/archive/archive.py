@@ -40,7 +40,7 @@ def _few(names: Sequence[str]) -> str:
 
 
 def default_root() -> Place:
-    """The default place of the archive: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
+    """The default root of the archive: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
     return with_packs(path_of(os.environ.get("TUMBLELINE_ARCHIVE") or "archive"))
 
 
@@ -52,7 +52,7 @@ class Archive:
 
     @property
     def address(self) -> str:
-        """By what another process opens the same archive."""
+        """The address by which another process opens this archive."""
         return address_of(self.root)
 
     @property
@@ -77,7 +77,7 @@ class Archive:
         files.publish(mark, self.mark)
 
     def refuse_none(self) -> None:
-        """Refuse a place that holds no archive, or one of another format."""
+        """Refuse a root that holds no archive, or an archive of another format."""
         if not (self.root / "archive.json").is_file():
             raise ArchiveUnusable(
                 f"archive: folder '{self.root}' holds no archive, one with runs is needed; name it with --archive or "

@@ -172,9 +172,9 @@ def _walk(folder: Place, prefix: str, links: list[str]) -> Iterator[str]:
 
 
 def _copy(source: Place, target: Place, name: str, chain: _ChainAtStart, copied: Copied) -> bool:
-    """Copy a file unless it is there; one that vanished meanwhile (a state, a temporary file) is left out, as is a newer seal.
+    """Copy a file unless it is there; a file that vanished meanwhile (state, temporary) is left out, as is a newer seal.
 
-    False where the one of the target was kept, because that of the source is damaged.
+    False where the copy in the target stays, because the file of the source is damaged.
     """
     from_path, to_path = source / name, target / name
     try:

@@ -24,7 +24,7 @@ AT_ONCE = 1000  # calibrations named by one entry of the chain
 class Cleaned:
     """The result of a cleaning.
 
-    removed : places of the temporary files and folders
+    removed : paths of the temporary files and folders
     busy : folders that another process writes to; they were not touched
     sealed : finished runs that were missing in the chain and are in it now
     anchored : number of calibrations that were missing in the chain and are in it now
@@ -82,7 +82,7 @@ def _remove(archive: Archive, path: Place, done: Cleaned, *, only_look: bool) ->
 
 @contextmanager
 def _owned(archive: Archive, path: Place) -> Generator[bool, None, None]:
-    """Whether no other process writes to the run, the capture or the folder of a place."""
+    """Whether no other process writes to the run, the capture or the folder that a path is in."""
     if isinstance(path, ObjectPath):
         yield True
         return

@@ -66,7 +66,7 @@ def read_json(path: Place) -> dict[str, Any]:
 
 
 def parsed(data: bytes, path: Place) -> dict[str, Any]:
-    """The content of a manifest from its bytes; refused where it names a place outside the archive."""
+    """The content of a manifest from its bytes; refused where it names a file outside the archive."""
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):

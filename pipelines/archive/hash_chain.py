@@ -1,4 +1,4 @@
-"""The archive's chain: numbered entries, each with the hash of the one before and of the manifests that it seals.
+"""The archive's chain: numbered entries, each with the hash of the entry before and of the manifests that it seals.
 
 ``chain/<thousands>/<number>.json``. An entry is created once; of two processes that write the next entry, one succeeds and the
 other takes the next number. A copy of the hash of the last entry, kept elsewhere, shows later whether an entry was removed.
@@ -20,7 +20,7 @@ def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str
     """The number of a new entry.
 
     kind : ``run``, ``calibrations``, ``programming`` or ``release``.
-    sealed : hashes of files by their place below the archive's root.
+    sealed : hashes of files by their path below the archive's root.
     about : who wrote it, where and when, and about what.
     """
     top = root / FOLDER
@@ -52,7 +52,7 @@ def last_number(root: Place) -> int:
 
 
 def entries(root: Place) -> Iterator[tuple[int, Place]]:
-    """Numbers and places of the entries up to the last, whether they are there or not."""
+    """Numbers and paths of the entries up to the last, whether they are there or not."""
     for number in range(1, last_number(root) + 1):
         yield number, path_of_entry(root, number)
 
@@ -63,7 +63,7 @@ def name_of_entry(number: int) -> str:
 
 
 def path_of_entry(root: Place, number: int) -> Place:
-    """Where an entry lies."""
+    """Path of an entry."""
     return root / name_of_entry(number)
 
 

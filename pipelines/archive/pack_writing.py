@@ -93,7 +93,7 @@ PAUSE_S = 0.05  # between new pack and removal: a folder's time of change tells 
 
 
 def merge_packs(root: Path) -> dict[str, list[str]]:
-    """Merge what is due; the zips that each new one replaced, by its name.
+    """Merge the packs that are due; the names of the zips that were replaced, by the name of the new zip.
 
     Only for the holder of the lock of the packs.
     """
@@ -131,7 +131,7 @@ def remove_replaced(root: Path) -> None:
 
 
 def _merged_pack(root: Path, what: str, paths: Sequence[Path]) -> str:
-    """One pack in place of some of one month; empty where later packs have all their files."""
+    """Merge packs of a month; the name of the new zip, empty where later packs have all their files."""
     known, top = packs.Packs(root), root / packs.FOLDER
     tables = [table for table in known.contents() if table.pack in paths]
     names: dict[str, int] = {}  # with the last change of the folder before it was packed

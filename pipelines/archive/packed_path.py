@@ -30,7 +30,7 @@ else:
 
 
 class PackedPath(Base):
-    """A place in a local archive with packs; each archive has its own class, so that every derived path knows its packs."""
+    """A path in a local archive with packs; each archive has its own class, so that every derived path knows its packs."""
 
     known: ClassVar[packs.Packs]
     __slots__ = ()
@@ -125,7 +125,7 @@ class PackedPath(Base):
         return name if str(self.known.root) == "." and not name.startswith("/") else ""
 
     def _refuse_link(self) -> None:
-        """Refuse a symbolic link on the way from a top folder, which may be one to another disk, to this place."""
+        """Refuse a symbolic link on the way from a top folder, which may lead to another disk, to this path."""
         levels, path = self._below_root().count("/"), str(self)
         for _ in range(levels):
             if os.path.islink(path):
@@ -171,17 +171,17 @@ class PackedPath(Base):
 
 
 def overlay(root: str, path: str = "") -> Path:
-    """The place of an archive, by default its root, as a path that also finds what is packed there."""
+    """A path of an archive, by default its root, that also finds what is packed there."""
     return _class_of(root, os.path.abspath(root))(path or root)
 
 
 def with_packs(root: Place) -> Place:
-    """The root of an archive that also finds what is packed there; one in an object store has no packs."""
+    """The root of an archive that also finds what is packed there; an object store has no packs."""
     return overlay(str(root)) if isinstance(root, Path) and not isinstance(root, PackedPath) else root
 
 
 def member_of(path: object) -> packs.Member | None:
-    """The packed file of a place that has none by itself; None for any other place."""
+    """The packed file at a path where no file lies by itself; None for any other path."""
     if not isinstance(path, PackedPath) or os.path.exists(path):
         return None
     return path._member()  # noqa: SLF001 - the question of this module

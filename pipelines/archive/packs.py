@@ -25,14 +25,14 @@ CONTENTS, CONTAINER = ".toc", ".zip"
 NAME = re.compile(r"\d{6}-[0-9a-z-]+")
 FOLDERS_OF = {"runs": 2, "captures": 2, "calibrations": 3}  # parts of the name of a folder that is packed as a whole
 TICK_NS = 2_000_000_000
-LATELY = 256  # folders that are kept
+LATELY = 256  # folders whose contents stay in memory
 LISTINGS = 16  # of the folder while another process merges packs
-SEARCHED = 4  # questions to one table before the places of its folders are kept
+SEARCHED = 4  # look-ups in a table before the offsets of its folders stay in memory
 BEGINNING = re.compile(rb'\n\{"folder":("(?:[^"\\]|\\.)*")')
 
 
 class Member(NamedTuple):
-    """A file in a pack: the zip, the place of its bytes there, and the time of its last change, ns since 1970."""
+    """A file in a pack: the zip, the offset of its bytes there, and the time of its last change, ns since 1970."""
 
     pack: Path
     offset: int

@@ -182,7 +182,7 @@ class Records:
         return digest({f.name: files.read_json(f / "record.json")["content"] for f in self._folders()})
 
     def samples(self, records: Collection[int] | None = None) -> Iterator[pd.DataFrame]:
-        """The samples, one table per record in order of record, or several of a long one: they never lie in memory together.
+        """The samples, one table per record in order of record, or several for a long record: they never lie in memory together.
 
         records : numbers of those that are wanted; all where None
         """

@@ -49,11 +49,11 @@ def lost_files(folder: Place, names: set[str]) -> list[str]:
 
 
 class Rooted(Protocol):
-    """The archive as its runs know it: a place."""
+    """What a run needs of its archive: the root."""
 
     @property
     def root(self) -> Place:
-        """Folder or place in an object store."""
+        """Folder, or path in an object store."""
         ...
 
 

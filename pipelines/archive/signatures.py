@@ -72,7 +72,7 @@ def check(content: Mapping[str, Any], keys: Mapping[str, Ed25519PublicKey]) -> s
 
 
 def public_keys(given: Collection[str] = ()) -> dict[str, Ed25519PublicKey]:
-    """The public keys that are trusted, by name: the given ones, else the one of the configured private key.
+    """The public keys that are trusted, by name: the given keys, else that of the configured private key.
 
     given : files in PEM, or keys as 64 hexadecimal digits.
     """

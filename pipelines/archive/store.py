@@ -1,4 +1,4 @@
-"""Where an archive lies: a local folder, or a place of any file system that Arrow knows (``s3://bucket/folder?…``).
+"""Where an archive lies: a local folder, or a path of any file system that Arrow knows (``s3://bucket/folder?…``).
 
 A local archive is :class:`pathlib.Path` throughout, at no cost. :class:`ObjectPath` answers to the same few methods for an
 object store, where putting an object is atomic by itself and folders exist only as beginnings of names.
@@ -28,11 +28,11 @@ class Size:
 
 
 class ObjectPath:
-    """A place in an object store, with the methods of :class:`pathlib.Path` that the archive uses.
+    """A path in an object store, with the methods of :class:`pathlib.Path` that the archive uses.
 
     system : the file system of pyarrow.
     key : bucket and key, with slashes.
-    scheme : begins the place's name for people.
+    scheme : begins the path as people read it.
     address : the archive's whole address as it was given.
     """
 
@@ -61,7 +61,7 @@ class ObjectPath:
 
     @property
     def parent(self) -> ObjectPath:
-        """The place around this one."""
+        """The path above."""
         return self._at(self.pure.parent)
 
     def is_file(self) -> bool:
@@ -69,7 +69,7 @@ class ObjectPath:
         return self._info().type.name == "File"
 
     def is_dir(self) -> bool:
-        """Whether names of objects begin with this one."""
+        """Whether there are objects below this path."""
         return self._info().type.name == "Directory"
 
     def exists(self) -> bool:
@@ -99,13 +99,13 @@ class ObjectPath:
         return io.BytesIO(self.read_bytes())
 
     def write_bytes(self, data: bytes) -> int:
-        """Put the object, whole or not at all; how many bytes it has."""
+        """Write the object completely or not at all; the number of its bytes."""
         with self.system.open_output_stream(self.key) as stream:  # the caller reports errors of the system
             stream.write(data)
         return len(data)
 
     def unlink(self, *, missing_ok: bool = False) -> None:
-        """Take the object away."""
+        """Remove the object."""
         with self._reached():
             try:
                 self.system.delete_file(self.key)
@@ -114,7 +114,7 @@ class ObjectPath:
                     raise
 
     def remove_all(self) -> None:
-        """Take away everything whose name begins with this one."""
+        """Remove all objects below this path."""
         with self._reached():
             self.system.delete_dir(self.key)
 
@@ -134,7 +134,7 @@ class ObjectPath:
         return iter(self._listed(recursive=True))
 
     def glob(self, pattern: str) -> Iterator[ObjectPath]:
-        """What lies below and has such a name; every part of the pattern is one level."""
+        """Paths below that match a pattern; each part of the pattern is one level."""
         return globbed(self, pattern)
 
     def _at(self, pure: PurePosixPath) -> ObjectPath:
@@ -165,7 +165,7 @@ class ObjectPath:
 
 
 def globbed(folder: Any, pattern: str) -> Iterator[Any]:
-    """What lies below a place and has such a name; every part of the pattern is one level."""
+    """Paths below a folder that match a pattern; each part of the pattern is one level."""
     first, _, rest = pattern.partition("/")
     matches = [folder / first]
     if any(mark in first for mark in "*?["):
@@ -182,7 +182,7 @@ Place: TypeAlias = Path | ObjectPath
 
 
 def path_of(address: str | Path | ObjectPath) -> Place:
-    """The folder, or the place in an object store, that an address names."""
+    """The folder, or the path in an object store, that an address names."""
     if isinstance(address, ObjectPath | Path):
         return address
     if "://" not in address:

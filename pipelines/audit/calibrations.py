@@ -64,7 +64,7 @@ def codes(texts: NDArray[Any]) -> Index:
 
 
 def day_of(moment: str) -> float:
-    """Days since 1970 of an ISO time; one without zone is UTC."""
+    """Days since 1970 of an ISO time; without a zone it is UTC."""
     instant = datetime.fromisoformat(moment)
     return (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).timestamp() / DAY_S
 
@@ -75,7 +75,7 @@ def date_of(day: float) -> str:
 
 
 def dated_runs(index: AuditIndex) -> pd.DataFrame:
-    """All runs, their columns as texts, with the day of measurement; NaN for one without a date that can be believed."""
+    """All runs, their columns as texts, with the day of measurement; NaN for a run without a plausible date."""
     runs = index.table("runs").to_pandas().astype(str)
     return runs.assign(day=[_day_or_nan(moment) for moment in runs["measured"]])
 

@@ -22,7 +22,7 @@ from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
 from pipelines.audit.rules import Rules
 
 MONTH_D = YEAR_D / 12.0
-OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
+OF_UNIT = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].of_unit)
 FEWEST_PAIRS = 8
 AHEAD = np.arange(0.0, 10.0 + 1e-9, 1.0 / 24.0)  # years, in steps of half a month
 
@@ -56,7 +56,7 @@ def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: fl
     pairs, out = pairs_of(calibrations, good), list[KindDrift]()
     spans = spans_of(calibrations, pairs)
     for device in np.unique(calibrations.device.astype(str)):
-        drifts = (_kind_drift(calibrations, pairs, spans, device, name, rules, since) for name in OWN)
+        drifts = (_kind_drift(calibrations, pairs, spans, device, name, rules, since) for name in OF_UNIT)
         found = [drift for drift in drifts if drift is not None]
         months = float("nan")
         if all(drift.known for drift in found):

@@ -20,7 +20,7 @@ from pipelines.certificates.validity import Calibration, calibrations_of
 class CertificateState(NamedTuple):
     """The state of a unit in the ledger on a day.
 
-    certificate : the valid one, else the last one, even if it ended; state : its state on that day: ``valid``,
+    certificate : the valid certificate, else the last, even if it ended; state : its state on that day: ``valid``,
         ``ended``, ``revoked`` or ``later`` (it begins later)
     until : day since 1970 with which it ends or ended
     entered : whether the last measurement is certified, in any state
@@ -118,7 +118,7 @@ class Due:
     months : the interval of the rules
     because : ``fixed`` or ``drift`` (the interval after the last pass), ``certificate`` (it ends, or has ended), ``revoked``, or
         ``did not pass``
-    certificate : the one valid on the day of the audit, else the last one; empty without one
+    certificate : the certificate valid on the day of the audit, else the last; empty without a certificate
     valid : whether a certificate is valid; entered : whether the last measurement is certified, in any state
     """
 

@@ -115,7 +115,7 @@ def _described(
 
 
 def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, scale: ChangeScale) -> tuple[int, int]:
-    """The good earlier calibration of the one other unit whose history it fits, and that unit; (−1, −1) for none or several."""
+    """Nearest earlier good calibration and its unit, where ``k`` fits the history of that unit alone; else (−1, −1)."""
     candidates = np.flatnonzero((days < days[k]) & ~foreign & (histories != histories[k]))
     if not candidates.size:
         return -1, -1
@@ -129,7 +129,7 @@ def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, 
 def _exchanged(
     k: int, unit: int, values: Array, foreign: Flags, histories: Index, days: Array, before: Index, scale: ChangeScale
 ) -> bool:
-    """Whether the other unit has a foreign calibration of the same days that fits the history of this one."""
+    """Whether the other unit has a foreign calibration of the same days that fits the history of this unit."""
     near = np.flatnonzero(foreign & (histories == unit) & (np.abs(days - days[k]) <= 1.0))
     years = np.abs(days[near] - days[before[k]]) / YEAR_D
     return bool(np.any(distance(values[near], values[before[k]], scale, years) <= foreign_above(scale)))

@@ -7,7 +7,7 @@ import numpy as np
 from inertial.arrays import Flags, Index
 from inertial.population.gauge import Gauge, gauge_study
 from pipelines.audit.calibrations import Calibrations
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.pairs import first_of_each
 from pipelines.audit.parameters import FAMILY_OF
 from pipelines.audit.rules import Rules
@@ -41,7 +41,7 @@ def studies(calibrations: Calibrations, good: Flags, rules: Rules) -> list[Study
         device = str(calibrations.device[rows[0, 0, 0]])
         days = calibrations.day[rows]
         runs = tuple(sorted({str(run) for run in calibrations.run[rows].ravel()}))
-        for name in OWN:
+        for name in OF_UNIT:
             values = calibrations.column(name)[rows]
             if np.isfinite(values).all():
                 components = gauge_study(values)

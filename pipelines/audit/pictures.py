@@ -8,7 +8,7 @@ import numpy as np
 
 from inertial.counts import number_of
 from pipelines.audit.audit import Audit
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.finding import AuditFinding
 from pipelines.audit.pairs import YEAR_D
 from pipelines.audit.parameters import NAMES, parameter_text, unit_text
@@ -164,10 +164,10 @@ def evidence_chart(audit: Audit, finding: AuditFinding) -> Chart | None:
 def _furthest(audit: Audit, units: Sequence[str]) -> str:
     """The parameter in which a unit's calibrations are most scattered relative to their errors."""
     rows = audit.all.unit == units[0]
-    columns = [NAMES.index(name) for name in OWN]
+    columns = [NAMES.index(name) for name in OF_UNIT]
     values, errors = audit.all.values[rows][:, columns], audit.all.errors[rows][:, columns]
     spread = np.nan_to_num(np.ptp(values, axis=0) / np.nanmax(errors, axis=0))
-    return OWN[int(np.argmax(spread))]
+    return OF_UNIT[int(np.argmax(spread))]
 
 
 def _histories(audit: Audit, units: Sequence[str], parameter: str, run: str) -> Chart:

@@ -12,7 +12,7 @@ from inertial.population.comparison import Comparison, compare, holm, outlier_li
 from inertial.population.memory import TO_SIGMA
 from inertial.population.two_way import group_medians
 from pipelines.audit.calibrations import Calibrations, codes, date_of
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.index import AuditIndex
 from pipelines.audit.pairs import first_of_each
 
@@ -193,7 +193,7 @@ def odd_ones(calibrations: Calibrations, chosen: Flags) -> list[Odd]:
     out: list[Odd] = []
     for device in np.unique(calibrations.device.astype(str)):
         rows = first[calibrations.device[first] == device]
-        values = np.stack([calibrations.column(name)[rows] for name in OWN], axis=1)
+        values = np.stack([calibrations.column(name)[rows] for name in OF_UNIT], axis=1)
         usable = np.isfinite(values).any(axis=0)
         if rows.size < FEWEST or not usable.any():
             continue
@@ -206,14 +206,14 @@ def _odd_units(calibrations: Calibrations, device: str, rows: Index, values: Arr
     z = np.nan_to_num(robust_z(values))
     return [
         Odd("unit", str(calibrations.unit[row]), device, str(calibrations.station[row]), str(calibrations.run[row]),
-            float(calibrations.day[row]), OWN[column], float(values[k, column]), float(z[k, column]), 1)
+            float(calibrations.day[row]), OF_UNIT[column], float(values[k, column]), float(z[k, column]), 1)
         for k, column in _outliers(z)
         if str(calibrations.run[row := rows[k]]) not in odd_lots
     ]  # fmt: skip
 
 
 def _outliers(z: Array) -> list[tuple[int, int]]:
-    """Rows of distances in σ (n, p) whose largest one is an outlier, with its column."""
+    """Rows of distances in σ (n, p) whose largest entry is an outlier, with its column."""
     worst = np.argmax(np.abs(z), axis=1)
     size = np.abs(z[np.arange(len(z)), worst])
     return [(int(k), int(worst[k])) for k in np.flatnonzero(size > outlier_limit(z.size, len(z)))]
@@ -242,7 +242,7 @@ def _odd_lots(calibrations: Calibrations, device: str, rows: Index, values: Arra
         run = str(runs[large[k]])
         row = rows[np.flatnonzero(lot == large[k])[0]]
         out.append(
-            Odd("lot", run, device, str(calibrations.station[row]), run, float(calibrations.day[row]), OWN[column],
+            Odd("lot", run, device, str(calibrations.station[row]), run, float(calibrations.day[row]), OF_UNIT[column],
                 float(means[k, column]), float(z[k, column]), int(counts[large[k]]))
         )  # fmt: skip
     return out

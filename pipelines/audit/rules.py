@@ -28,8 +28,8 @@ class Tolerance(Strict):
 
 def _checked(tolerances: dict[str, Tolerance]) -> dict[str, Tolerance]:
     for name, tolerance in tolerances.items():
-        if name not in FAMILIES or not FAMILIES[name].own:
-            families = [family for family, content in FAMILIES.items() if content.own]
+        if name not in FAMILIES or not FAMILIES[name].of_unit:
+            families = [family for family, content in FAMILIES.items() if content.of_unit]
             raise ValueError(f"unknown parameter '{name}'; {did_you_mean(name, families)}")
         if tolerance.unit != FAMILIES[name].unit:
             raise ValueError(

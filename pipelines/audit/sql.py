@@ -58,7 +58,7 @@ def ask(
     Parameters
     ----------
     compact : whether ``coefficients``, ``figures`` … are read from the index; else from the files of the runs
-    index : one that the caller holds; None: the index is brought up to date first
+    index : an index that the caller holds; None: the index is brought up to date first
     """
     statement = one_reading_statement(sql)
     views = {word.lower() for word in WORD.findall(sql)} & set(VIEWS)

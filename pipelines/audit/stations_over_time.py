@@ -10,7 +10,7 @@ from inertial.population.change_points import ChangePoint, change_points, noise_
 from inertial.population.control_charts import Baseline, alarms, baseline, chance_of_alarms, signals
 from inertial.population.two_way import unit_and_place
 from pipelines.audit.calibrations import Calibrations, codes
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.rules import Rules
 
@@ -134,7 +134,7 @@ def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[Contr
         order = np.lexsort((calibrations.run[of_standard].astype(str), calibrations.day[of_standard]))
         of_standard = of_standard[order]
         station, unit = str(key).split("\t")
-        for name in OWN:
+        for name in OF_UNIT:
             values = calibrations.column(name)[of_standard]
             finite = np.isfinite(values)
             if finite.sum() > rules.baseline_points:

@@ -34,7 +34,7 @@ class TablesInMemory:
     def __init__(self, tables: Mapping[str, pa.Table]) -> None:
         self._asking = threading.Lock()
         self._connection = sqlite3.connect(":memory:", check_same_thread=False)
-        # its own leaves letters beyond ASCII
+        # lower() of SQLite leaves letters beyond ASCII
         self._connection.create_function("lower", 1, str.lower, deterministic=True)
         for name, table in tables.items():
             columns = ", ".join(f'"{column}"' for column in table.column_names)

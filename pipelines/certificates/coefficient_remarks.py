@@ -17,7 +17,7 @@ TABLES = ("coefficients", "covariance", "grades")
 
 
 def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
-    """Files of a run, and certificates of its units, without a signature of the own key; empty without an own key.
+    """Files of a run, and certificates of its units, without a signature of the configured key; empty where no key is configured.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ class Ledger:
 
     Parameters
     ----------
-    archive : the archive, or its place or address.
+    archive : the archive, or its root or address.
     """
 
     def __init__(self, archive: Archive | Place | str) -> None:
@@ -218,7 +218,7 @@ def _same(calibration: Calibration, event: LedgerEntry) -> bool:
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
-    """By serial, the calibration that certifies this run: the one that is not ended, else the last.
+    """By serial, the calibration that certifies this run: the valid calibration, else the last.
 
     Raises
     ------

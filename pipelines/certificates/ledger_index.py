@@ -62,7 +62,7 @@ def histories_of(root: Place) -> Histories:
 
 
 def _events(histories: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, LedgerEntry | str]:
-    """Events by the places of their files, or the fault of a file; new events are added to the index."""
+    """Events by the paths of their files, or the fault of a file; new events are added to the index."""
     path = root / INDEX_FOLDER / f"{digit}.noted"
     before, state = indexed_events(path)
     if state == derived.EDITED:
@@ -137,7 +137,7 @@ def _read(top: Place, name: str) -> LedgerEntry | str:
 
 
 def indexed_events(path: Place) -> tuple[dict[str, IndexedEvent], str]:
-    """The index by the place of the event's file, and the state of its seal; empty where the seal is not sound."""
+    """The indexed events by the path of their file, and the state of its seal; empty where the seal is not sound."""
     import pyarrow.parquet as pq
 
     try:
@@ -188,7 +188,7 @@ def _encoded(known: Mapping[str, IndexedEvent]) -> bytes:
 
 
 def stamps_of(top: Place) -> dict[str, dict[str, str]]:
-    """Size and time of every event's file: by the first digit of its folder, by its place below ``calibrations``."""
+    """Size and time of every event's file: by the first digit of its folder, by its path below ``calibrations``."""
     out: dict[str, dict[str, str]] = {}
     if isinstance(top, ObjectPath):
         for info in _objects(top):
@@ -206,7 +206,7 @@ def stamps_of(top: Place) -> dict[str, dict[str, str]]:
 
 
 def _packed(top: Path) -> Iterable[tuple[str, str]]:
-    """Places of the packed events, with their sizes and times before they were packed."""
+    """Paths of the packed events, with their sizes and times before they were packed."""
     for folder, packed in top.known.folders(FOLDER).items() if isinstance(top, PackedPath) else ():
         start = folder.removeprefix(f"{FOLDER}/")
         for name, member in packed.files.items():

@@ -79,7 +79,7 @@ def nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: in
     Parameters
     ----------
     known : the unit's that hold on any day.
-    certificate : sequence of the one that was meant; 0 for any.
+    certificate : sequence of the certificate that was meant; 0 for any.
     """
     if not known:
         return f"revoke: unit {serial!r} has no calibration that holds, one is needed; see 'tumbleline show' with --at"

@@ -78,9 +78,9 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     units : serials; every unit of the run that passed where empty.
     start : first day, today where empty.
     until : day after the last, so many ``months`` after the first where empty, as many as are allowed where that is 0.
-    reason : kept with the events; units whose certificate of this run was revoked are certified again only by name, with one
+    reason : kept with the events; a unit whose certificate of this run was revoked needs its name and a reason
     supersede : end calibrations that begin later and overlap, too.
-    keys : public keys that are trusted; the own where None. Where there are any the run must be signed by one.
+    keys : trusted public keys; that of the configured private key where None. Where there are keys, one must have signed the run.
 
     Raises
     ------

@@ -64,11 +64,11 @@ class LotLooks:
         self._due = {dwells[count - 1] for count in look_counts(self._activities, job.station, job.recipe)}
 
     def due(self, record: int) -> bool:
-        """Whether the records are looked at after this one."""
+        """Whether the records so far are evaluated after this record."""
         return record in self._due
 
     def look(self, record: int, told: frozenset[str]) -> Look:
-        """What the records up to this one say."""
+        """The evaluation of the records up to this record."""
         with threadpool_limits(1):
             try:
                 return self._look(record, told)
@@ -211,7 +211,7 @@ class _Evaluated:
 def _open_figures(
     plain: pd.DataFrame, guarded: pd.DataFrame, limits: Limits, units: Sequence[str]
 ) -> dict[str, frozenset[str]]:
-    """Limited figures of the dwells that do not pass, by unit: coefficients by the guarded rule, verification by the limits' own.
+    """Limited figures of the dwells that do not pass, by unit: coefficients by the guarded rule, verification by the plain rule.
 
     Further dwells of the fit hardly change a figure of verification, so that looks do not give it more chances to pass.
     """

@@ -66,7 +66,7 @@ def decisive(job: Job) -> dict[str, Any]:
 
 
 def _origin(job: Job, archive: Archive) -> dict[str, str]:
-    """The run of which a new one analyses the data again, where another run has measured them; the new one is no measurement."""
+    """The run that measured the data of a job, where the capture is complete already: the new run is then a re-analysis."""
     if not archive.capture(job.capture_id).is_complete():
         return {}
     first = archive.first_run_of(job.capture_id, [unit.serial for unit in job.lot.units])

@@ -88,12 +88,12 @@ def command_line(*words: str) -> str:
 
 
 def archive_words(archive: str | None) -> list[str]:
-    """The option that names an archive; none for the default one."""
+    """The option that names an archive; none for the default archive."""
     return ["--archive", str(archive)] if archive else []
 
 
 def judged_data(source: str, history: str, given: Given) -> JudgedData:
-    """The data of a command, with a fresh run: the one given, beside a file, or the one that an archive holds or will hold.
+    """The data of a command, with a fresh run: as given, beside a file, or the run that an archive holds or will hold.
 
     history : the file of temperatures against time that was read; empty where there was none
     """
@@ -124,7 +124,7 @@ def judged_data(source: str, history: str, given: Given) -> JudgedData:
 def extension(
     file: Path | str, effects: Sequence[str], judged: Sequence[str], data: JudgedData, *, new: bool
 ) -> list[str]:
-    """The commands that add effects to a model file, and the one that shows the errors of its versions.
+    """The commands that add effects to a model file, and the command that shows the errors of its versions.
 
     judged : the model that was judged; a new file begins with it
     new : whether the file does not exist yet
@@ -140,7 +140,7 @@ def extension(
 
 
 def fresh_measurement(file: Path | str, data: JudgedData) -> list[str]:
-    """The command that measures the units again, where that is possible and not done, and the one that shows the errors."""
+    """The command that measures the units again, where that is possible and not done, and the command that shows the errors."""
     return [*([command_line(*data.measure)] if data.measure else []), versions(file, data)]
 
 

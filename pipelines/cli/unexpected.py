@@ -20,7 +20,7 @@ _SECRET = re.compile(r"//[^/@\s]+@")
 
 
 def write_report(problem: Exception) -> str:
-    """Write the report; return one line with the kind of the exception and the place of the report."""
+    """Write the report; return one line with the kind of the exception and the path of the report."""
     location = _location(problem)
     what = f"unexpected {type(problem).__name__} in {location} ({reason(problem)})"
     report = _written(_report(problem))

@@ -116,7 +116,7 @@ def _table_of_dwells(
 
 
 def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
-    """The mapping, with the unit that the file states where none was given; one without columns or unit is refused."""
+    """The mapping, with the unit that the file states where none was given; a mapping without columns or unit is refused."""
     from pipelines.importers import mapping as mapped
     from pipelines.importers import stated_units
 

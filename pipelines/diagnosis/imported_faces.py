@@ -24,12 +24,12 @@ COVERAGE = 2.0
 """Factor k of the printed uncertainties: the standard errors of a fit hold Student's factor for it already."""
 GROSS = 0.05
 """Smallest part of gravity along a face placed by hand: cos 18° is 0.95."""
-_OWN = 0.9
-"""Share of its own axis in the response of an output: 25° of a hand."""
+_ON_AXIS = 0.9
+"""Least cosine of the angle between an output and its axis: 25° where a hand turns the device."""
 _ODD = 0.5
-"""Distance of the sums of two pairs of faces, over those of the third from both, below which the third is the odd one."""
+"""Distance between the sums of two pairs of faces, over their distances from the third sum, below which the third pair leans."""
 _NOISELESS = 1e-6
-"""Noise over gravity that is put in for means without a recorded one: far below any scatter, which alone counts then."""
+"""Noise over gravity that stands for noise that was not recorded: far below any scatter, which alone counts then."""
 
 
 def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
@@ -83,7 +83,7 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
 
 
 def _with_noise(dwells: pd.DataFrame, plain: Faces) -> pd.DataFrame:
-    """The dwells with their noise; where it is not recorded, with one so small that the scatter about the fit decides."""
+    """The dwells with their noise; where none is recorded it is so small that the scatter about the fit decides."""
     if {*SPREAD_COLUMNS, "n"} <= set(dwells.columns):
         return dwells
     made = dwells.assign(n=1)
@@ -117,13 +117,13 @@ def _exchanged(up: Array, down: Array, gravity: float) -> str:
         fit = faces(means[order[:3]], means[order[3:]], gravity)
         size = np.linalg.norm(fit.response, axis=1)
         cosines = np.diagonal(fit.response) / size
-        if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(cosines)) > _OWN:
+        if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(cosines)) > _ON_AXIS:
             agreeing.append(f"{names[first]} and {names[second]}")
     return f"; with {agreeing[0]} exchanged they agree" if len(agreeing) == 1 else ""
 
 
 def _askew(up: Array, down: Array, response: Array) -> str:
-    """The pair of faces of which one leans; empty where the three pairs disagree alike.
+    """A message that names the pair of faces of which one leans; empty where the three pairs disagree alike.
 
     The outputs of a pair add up to twice the bias; a face that leans by an angle adds the force of that angle, across it.
 

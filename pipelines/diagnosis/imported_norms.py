@@ -254,7 +254,7 @@ _NORM_NEEDS = 9
 
 
 def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
-    """The fit called ``method``, one of :data:`METHODS`, of one unit's import, with a verdict on its own adequacy."""
+    """The fit ``method`` of :data:`METHODS` to the import of a unit, with the verdict on its adequacy."""
     if data.dwells is not None:
         imported_dwells(data)  # refuses what no fit at import can use
     silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""

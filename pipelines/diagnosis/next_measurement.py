@@ -29,7 +29,7 @@ class Proposed:
     """What to measure next, in order: steps that separate classes of several effects, then steps that show unseen effects.
 
     parting : classes, each with None if no steps of the station are certain to separate it
-    twins : per class, the members that no measurement of the station separates from its best one, and that one
+    twins : per class, the members that no measurement of the station separates from its best member, and that member
     showing : None if no unseen effect matters, or the station cannot show any
     """
 
@@ -196,7 +196,7 @@ def _explicit(base: Recipe, soak: int) -> dict[str, Any]:
 
 
 def _soak_for(soaks: list[dict[str, Any]], row: dict[str, Any]) -> dict[str, Any]:
-    """The soak that a step is measured in: the last one at its temperature, else a new one."""
+    """The soak that a step is measured in: the last soak at its temperature, else a new soak."""
     temperature = float(row["chamber_C"])
     if abs(soaks[-1]["temperature_C"] - temperature) >= SAME_SOAK_K:
         soaks.append(
@@ -213,7 +213,7 @@ def _soak_for(soaks: list[dict[str, Any]], row: dict[str, Any]) -> dict[str, Any
 
 
 def _tidied(part: dict[str, Any], base: Recipe) -> dict[str, Any]:
-    """A soak without waits and times without power of its own."""
+    """A soak without ``waits_s`` and ``off_s`` that only repeat what the recipe ``base`` has anyway."""
     tidied = dict(part)
     if all(wait == base.settle_s for wait in part["waits_s"]):
         tidied["waits_s"] = None

@@ -22,7 +22,7 @@ BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""
 
 _ALIKE = 0.5
-"""Share of the residuals' variance from which it is said that they are alike in all units: more than is the units' own."""
+"""Share of the variance of the residuals that is common to all units, from which on a notice says so."""
 
 _ACROSS, _ALONG = 0.3, 0.9
 """Forces along the axis, g, below and above which its noise is compared."""
@@ -258,7 +258,7 @@ def noise_along(run: ExaminedRun) -> list[str]:
 
 
 def noise_of_the_lot(model: Model, units: int) -> list[str]:
-    """A notice where much of the residual of a model is the same in all units."""
+    """A notice where the variance of the residuals is, for the greater part, common to all units."""
     alike = correlation_of_units(model)
     if alike < _ALIKE:
         return []

@@ -268,7 +268,7 @@ def why_first(document: dict[str, Any]) -> list[str]:
 
 
 def cost_to_decide(document: dict[str, Any]) -> list[str]:
-    """What the next measurement costs and brings, one line for each purpose; or what would separate a class in place of it."""
+    """Cost and gain of the next measurement, a line for each purpose; where none is possible, what would separate the class."""
     lines: list[str] = []
     rows = document["next_measurements"]
     for why in dict.fromkeys(row["why"] for row in rows):

@@ -80,7 +80,7 @@ def as_numbers(values: Sequence[str]) -> dict[str, float] | None:
 
 
 def _append(archive: Archive, content: Mapping[str, Any]) -> str:
-    """Write the next file, and its name; of two processes one waits."""
+    """Write the next file of attributes and return its name; a second process waits."""
     with alone(archive.root / FOLDER, wait=True):
         path = archive.root / FOLDER / f"{len(attribute_files(archive)) + 1:06d}.json"
         files.publish(path, files.manifest_bytes(content))

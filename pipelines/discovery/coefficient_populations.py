@@ -28,7 +28,7 @@ def populations(archive: Archive, device: str, workers: int = 1) -> list[Populat
     of_kind = every.chosen(every.device.astype(str) == device)
     order = np.argsort(of_kind.day, kind="stable")
     first = of_kind.chosen(order[np.unique(of_kind.unit[order].astype(str), return_index=True)[1]])
-    judged = [name for name in NAMES if FAMILIES[FAMILY_OF[name]].own]
+    judged = [name for name in NAMES if FAMILIES[FAMILY_OF[name]].of_unit]
     needed = float(np.log(len(judged) / ALPHA))
     rows: list[PopulationRow] = []
     for name in judged:

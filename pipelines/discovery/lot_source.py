@@ -30,7 +30,7 @@ Column = tuple[str, int]
 SEASON, OPERATOR = "season", "operator"
 OWN_TEMPCO = "own temperature coefficient"
 """A driver: what a unit's thermometer has wrong, its output has wrong by this."""
-_PLACES = 3  # of a force in g, within which poses are the same
+_DECIMALS = 3  # of a force in g, to which poses are the same
 
 
 class DiscoveryArchive:
@@ -229,10 +229,10 @@ class DiscoveryArchive:
     def poses(self, run: str) -> Array:
         """Forces (n, 3), g, of the poses of a run, each once."""
         force = measured(Run(self.archive, run).table("dwells")).state.force.reshape(-1, 3)
-        return np.unique(np.round(force, _PLACES), axis=0)
+        return np.unique(np.round(force, _DECIMALS), axis=0)
 
     def folder(self) -> Place:
-        """Where the evidence of the device is kept."""
+        """Folder of the evidence of the device."""
         return self.archive.root / FOLDER / re.sub(r"[^A-Za-z0-9._-]", "_", self.device)
 
 

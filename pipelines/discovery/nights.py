@@ -73,7 +73,7 @@ def _beyond(state: Evidences) -> list[Alarm]:
 
 
 def held(state: Evidences, alarm: Alarm) -> bool:
-    """Whether an alarm may be the station's own: the same for a whole lot, of an effect that wanders or differs with stations."""
+    """Whether the station may cause an alarm: the driver is common to a lot, the effect wanders or differs between stations."""
     sensor, wander = state.sensor, state.sensor.wander
     if alarm.index >= sensor.size or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT, STATION}:
         return False  # of a station, for good or by wander: stations differ

@@ -226,7 +226,7 @@ def _of_planes(data: bytes) -> Array:
 
 
 def _logarithms(ratio: Array, steps: float, unity: int) -> NDArray[np.uint8]:
-    """Ratios as logarithms in one byte, of which ``one`` is a ratio of one; zero is zero."""
+    """Ratios as logarithms in one byte, ``unity`` is the code of a ratio of one; zero is zero."""
     code = np.round(steps * np.log2(np.clip(ratio, 1e-30, None))) + unity
     return np.where(ratio > 0.0, np.clip(code, 1, 255), 0).astype(np.uint8)
 

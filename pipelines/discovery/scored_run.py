@@ -21,7 +21,7 @@ LOGGER = logging.getLogger("tumbleline.discovery")
 
 @dataclass(frozen=True)
 class ScoredRun:
-    """What is kept of a run.
+    """The scores of a run, as they are stored.
 
     left_out : why it is not pooled; empty where it is · columns : of the sensor, then of the station
     score, own : (units, m·k); information : (m·k,) · station : (2, q), scores and information

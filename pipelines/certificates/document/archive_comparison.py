@@ -17,7 +17,7 @@ from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.signature_check import CertificateFacts, canonical, first, parsed, statements
 from schemas.errors import ArchiveUnusable, TumblelineError
 
-SHOWN = 3  # different places that are named
+SHOWN = 3  # differences that are named
 LONGEST = 90  # of a text that is shown
 SPACE = "space between elements"
 NONE = ("", "", "")
@@ -75,7 +75,7 @@ def compare(root: Any, facts: CertificateFacts, archive: Archive, who: Laborator
 def _made_again(
     root: Any, run: Run, calibration: Calibration, known: list[Calibration], who: LaboratoryFile | None
 ) -> list[CertificateContent]:
-    """The document of the day of issue, and, where another has replaced the certificate since, the one that names that."""
+    """The document of the day of issue, and, where the certificate was replaced since, the document that names its successor."""
     first = compose(run, replace(calibration, ended_by=None), known, who or NOBODY)
     if who is None:
         said = laboratory_in(root, first)
@@ -102,7 +102,7 @@ def _other_entry(facts: CertificateFacts, calibration: Calibration) -> tuple[str
 
 
 def _different(here: Any, there: Any) -> list[str]:
-    """The first places at which two documents differ, and how many there are."""
+    """The first differences of two documents, and the number of the others."""
     pairs = [(a, b) for a, b in zip_longest(_nodes(here), _nodes(there)) if (a or NONE)[:2] != (b or NONE)[:2]]
     if not pairs:
         return ["the file differs from the document of the archive in what stands around its root element"]
@@ -129,7 +129,7 @@ def _short(text: str, same: int = 0) -> str:
 
 
 def _nodes(root: Any) -> Iterator[tuple[str, str, str]]:
-    """Every element, attribute and text of a document in order: what it is, its text, and the place that people know."""
+    """Every element, attribute and text of a document in order: tag, text, and a label that a reader knows."""
     for element in root.iter():
         if not isinstance(element.tag, str):
             yield "comment or instruction", str(element.text), "comment or instruction"
@@ -142,7 +142,7 @@ def _nodes(root: Any) -> Iterator[tuple[str, str, str]]:
 
 
 def _named(element: Any) -> str:
-    """The path of an element below the nearest one that has a name, such as a result."""
+    """The path of an element below the nearest element that has a name, such as a result."""
     path: list[str] = []
     while element is not None:
         head = next((child.findtext("{*}content") for child in element.findall("{*}name")), None)

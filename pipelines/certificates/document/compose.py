@@ -240,7 +240,7 @@ def _grade_statement(budget: StatedBudget, grade: str) -> str:
 
 
 def _amendment(calibration: Calibration, known: list[Calibration]) -> content.Amendment:
-    """A certificate of the same run that this one ended, or that was revoked before: its amendment; one that ended this one."""
+    """The certificates of the run that a certificate replaces, with the reason, and the certificate that replaces it."""
     earlier = [old for old in known if old.run == calibration.run and old.event.sequence < calibration.event.sequence]
     ended = [old.certificate for old in earlier if old.event.sequence in calibration.event.ends]
     alike = [old for old in earlier if calibration.event.ends_others_of(old.event)][-1:]

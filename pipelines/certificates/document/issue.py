@@ -140,7 +140,7 @@ def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibrat
 
 
 def _of_unit(serial: str, known: list[Calibration], number: str) -> Calibration:
-    """The certificate of a unit with a number; without one the last that was not ended, else the last."""
+    """The certificate of a unit with a number; without a number the last valid certificate, else the last."""
     if number:
         meant = [calibration for calibration in known if str(calibration.event.sequence) == number]
         if not meant:

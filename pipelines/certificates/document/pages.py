@@ -206,7 +206,7 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
 
 
 def _folded(rows: tuple[Contribution, ...]) -> list[Contribution]:
-    """The rows of a budget, those that would be printed with a share of 0.0 % as one."""
+    """The rows of a budget, those that would be printed with a share of 0.0 % as one row."""
     small = [row for row in rows if row.share < SMALLEST_SHARE]
     if len(small) < 2:
         return list(rows)

@@ -35,7 +35,7 @@ class SigningKey:
 
 
 def read_key(path: Path, password_file: Path | None = None) -> SigningKey:
-    """The key of a PKCS#12 file, or of a PEM file with the private key and its certificates, own one first.
+    """The key of a PKCS#12 file, or of a PEM file with the private key and its certificates, that of the key first.
 
     Raises
     ------

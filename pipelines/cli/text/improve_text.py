@@ -68,7 +68,7 @@ def next_lines(
 ) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
-    files : the model that was judged, None for a list of effects, and the one to write
+    files : the model that was judged, None for a list of effects, and the model file to write
     repeated : options of ``improve`` that name the file to write and the author, as they were given
     """
     from pipelines.cli.history import removal

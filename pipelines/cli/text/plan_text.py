@@ -232,7 +232,7 @@ def print_optimum(document: dict[str, Any], where: Sequence[str]) -> None:
 
 
 def _comparison(document: dict[str, Any]) -> list[str]:
-    """Sentences that compare the new recipe with the own one and the textbook plan."""
+    """Sentences that compare the new recipe with the given recipe and the textbook plan."""
     name, more = document["from"], document["minutes"]["total"] - document["own_minutes"]["total"]
     difference = (
         f"{abs(more):.0f} min {'more' if more > 0.0 else 'less'} than {name}" if abs(more) >= 0.5 else f"as {name}"
