@@ -1,4 +1,4 @@
-"""What an archive knows of units and runs beside the measurement: wafer, supplier, batch, firmware, operator, date of assembly.
+"""Attributes of units and runs beside the measurement: wafer, supplier, batch, firmware, operator, date of assembly.
 
 One file for each time that something was added; a changed value is a new row, and the newest one counts.
 """

@@ -65,7 +65,7 @@ class PackedPath(Base):
         return isinstance(self._packed(), int) if mode is None else S_ISDIR(mode)
 
     def _mode(self, *, follow_symlinks: bool = True) -> int | None:
-        """What is here by itself, None for nothing; a folder that may not be looked into is an error, as of any path."""
+        """The mode of an unpacked file or folder at this path, None for none; a folder without permission is an error."""
         try:
             return os.stat(self, follow_symlinks=follow_symlinks).st_mode
         except OSError as problem:
@@ -96,7 +96,7 @@ class PackedPath(Base):
             return file.read()
 
     def iterdir(self) -> Generator[Any, None, None]:
-        """What lies directly below, by itself or packed, in no particular order; refused behind a symbolic link."""
+        """Paths directly below, packed or not, in no particular order; refused behind a symbolic link."""
         self._refuse_link()
         try:
             names = set(os.listdir(self))
@@ -109,7 +109,7 @@ class PackedPath(Base):
         yield from [self / name for name in names]
 
     def glob(self, pattern: str | os.PathLike[str], **options: Any) -> Generator[Any, None, None]:
-        """What lies below and has such a name; with packs every part of the pattern is one level."""
+        """Paths below that match a pattern; with packs each part of the pattern is one level."""
         pattern = str(pattern)  # from Python 3.13 on rglob gives a path
         if "**" in pattern or not self.known.contents():
             yield from super().glob(pattern, **options)

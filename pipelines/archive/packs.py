@@ -182,7 +182,7 @@ def read_together(members: Mapping[str, Member]) -> dict[str, bytes]:
 
 
 def identity_of(path: Path) -> tuple[str, int, int]:
-    """What tells a file from another one of the same name: an archive may be removed and restored."""
+    """Name, inode and time of change: they tell a file from another of the same name, as after a restored archive."""
     about = path.stat()
     return path.name, about.st_ino, about.st_mtime_ns
 

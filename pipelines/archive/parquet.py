@@ -55,7 +55,7 @@ def decoded(data: bytes, columns: Sequence[str] = ()) -> pa.Table:
 
 
 def _remedy(path: Place) -> str:
-    """What to do about a damaged table: what a run computed can be made again, what a capture holds only be measured again."""
+    """The remedy for a damaged table: results of a run can be computed again, those of a capture only be measured again."""
     restore = "restore it from a copy that 'tumbleline archive backup' made"
     found = _FOLDER.match(str(path))
     if found is None:

@@ -66,18 +66,18 @@ class Run:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What the run was started with: recipe, limits, lot, station, capture; and who, where, when."""
+        """The start of the run: recipe, limits, lot, station, capture; and who, where, when."""
         return files.read_json(self.path / START)
 
     @property
     def origin(self) -> dict[str, str]:
-        """What ``run.json`` of a re-analysis of this run says of it: the run, and when its data were measured."""
+        """Entries of ``run.json`` of a re-analysis: this run, and when its data were measured."""
         about = self.about
         return {"rerun_of": self.id, "measured": str(about.get("measured") or about["when"])}
 
     @property
     def records(self) -> Records | None:
-        """What was captured for this run; None for a run on imported tables."""
+        """Records of the capture of this run; None for a run on imported tables."""
         capture = self.about.get("capture")
         return Records(self.archive.root / "captures" / capture) if capture else None
 

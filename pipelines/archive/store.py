@@ -21,7 +21,7 @@ REMEDY = "check the address, the credentials and the network"
 
 @dataclass(frozen=True)
 class Size:
-    """What is asked of an object's ``stat``: its bytes, and when it was put, seconds since 1970 on the store's clock."""
+    """The ``stat`` of an object: its bytes, and when it was written, seconds since 1970 on the clock of the store."""
 
     st_size: int
     st_mtime: float
@@ -126,7 +126,7 @@ class ObjectPath:
         return self
 
     def iterdir(self) -> Iterator[ObjectPath]:
-        """What lies directly below, in no particular order."""
+        """Paths directly below, in no particular order."""
         return iter(self._listed(recursive=False))
 
     def walk(self) -> Iterator[ObjectPath]:
@@ -210,7 +210,7 @@ def address_of(path: Place) -> str:
 
 
 def first_line(problem: Exception) -> str:
-    """What a system says went wrong, without the rest."""
+    """The first line of the message of an exception."""
     text = getattr(problem, "strerror", None) or str(problem) or type(problem).__name__
     return str(text).splitlines()[0]
 

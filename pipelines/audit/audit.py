@@ -43,7 +43,7 @@ class Scope:
 
 
 def scope_of(since: str, until: str, device: str, station: str) -> Scope:
-    """What is looked at, from dates as texts; ``until`` holds its whole day."""
+    """The scope of an audit from dates as texts; the day ``until`` is included."""
     first = day_of(checked(since or FIRST, "--since"))
     last = day_of(checked(until or today(), "--until")) + 1.0
     if first >= last:

@@ -209,7 +209,7 @@ def gathered(paths: Iterable[Place]) -> pa.Table:
 
 
 def _source(path: Path) -> pa.BufferReader | str:
-    """Where the bytes of a file are: its own path, or its part of a pack, which is read when it is needed."""
+    """The source of the bytes of a file: its path, or its part of a pack, which is read when it is needed."""
     member = member_of(path)
     if member is None:
         return str(path)

@@ -1,4 +1,4 @@
-"""What the ledger refuses, and why: a strange serial, an overdue standard, dates that are not allowed, and more."""
+"""Refusals of the ledger with their reasons: a strange serial, an overdue standard, dates that are not allowed, and more."""
 
 import re
 from collections.abc import Sequence

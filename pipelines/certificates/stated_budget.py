@@ -1,4 +1,4 @@
-"""What a certificate states of a unit's uncertainty, from the tables of its run: quantities, decisions, references."""
+"""The uncertainty of a unit in its certificate, from the tables of its run: quantities, decisions, references."""
 
 from dataclasses import dataclass
 from typing import Any

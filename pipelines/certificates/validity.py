@@ -82,7 +82,7 @@ class Calibration:
         return self.start <= day < self.until
 
     def key_values(self) -> list[str]:
-        """What exports and reports state of it: certificate, first day, the day after the last, state, reason of its end."""
+        """The entry of exports and reports: certificate, first day, the day after the last, state, reason of its end."""
         return [self.certificate, self.start, self.until, self.state, self.reason]
 
     def sentence(self) -> str:

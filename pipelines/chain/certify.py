@@ -42,10 +42,10 @@ IMPORTED = "imported"
 
 @dataclass
 class Certified:
-    """What became of a run's units.
+    """The result of the certification of the units of a run.
 
     written : the events that certify, new in the ledger
-    there : those that were in it already
+    there : events that were in it already
     left_out : why a unit was not certified, by serial
     """
 
@@ -121,7 +121,7 @@ def certify(  # noqa: PLR0913 - each is an option of the command
 def _proposals(
     run: Run, units: Sequence[str], first: str, last: str, reason: str
 ) -> tuple[list[LedgerEntry], Certified]:
-    """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
+    """The events to be written, and the units left out with the reason; a named unit that may not be certified is refused."""
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
     refuse_overdue(run)
     adequacy = refuse_inadequate(run)

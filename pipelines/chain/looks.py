@@ -114,7 +114,7 @@ class LotLooks:
         return Look(known=True, text=text, fails=new, given_up=self._given_up(record))
 
     def _missing(self, record: int, state: "_Evaluated") -> str:
-        """What else is needed before the lot may end, with a leading semicolon; empty where nothing is."""
+        """The reason why the lot may not end yet, with a leading semicolon; empty where it may."""
         if self.terms.visible:
             effects = self.job.recipe.effects
             rows = visibilities(self._state(record), effects, 1.0, self.terms.visible)

@@ -148,7 +148,7 @@ class _Line:
         self.front, self.kept, self.behind, self.added = list[str](), list[str](), list[str](), list[list[str]]()
 
     def put(self, new: str, value: str) -> None:
-        """What stands for an option with a value."""
+        """Put the present words for a former option with a value."""
         text = new.replace("{}", value)
         if text.startswith("+"):
             self.added.append(text[1:].split(" ", 1))
@@ -165,7 +165,7 @@ class _Line:
 
 
 def _rule(rules: dict[str, str], option: str, value: str) -> str | None:
-    """What an option of the version before is now; None for an option that is present."""
+    """The present words for a former option; None for an option that exists."""
     for stated, new in rules.items():
         name, _, pattern = stated.partition(" ")
         if name == option and (not pattern or fnmatchcase(value, pattern)):

@@ -211,7 +211,7 @@ def free_name(stem: str = "model") -> str:
 
 
 def fit_refusal(run: Run, effects: Sequence[str]) -> str:
-    """What a run's recipe lacks to fit a model, and why its dwells show the model none the less; empty where it lacks nothing."""
+    """Why the recipe of a run cannot fit a model that its dwells show; empty where it can."""
     from pipelines.jobs.job import job_of_run
     from pipelines.planning.context import with_verification_hint
     from pipelines.planning.plan import missing

@@ -206,7 +206,7 @@ def written(best: Optimum, target: Path, home: Path, document: dict[str, Any]) -
 
 
 def missing_limits(recipe: Recipe, home: Path) -> str:
-    """What is missing where the limits of a recipe cannot be read from its folder; empty where they can."""
+    """A warning where the limits of a recipe cannot be read from its folder; else empty."""
     try:
         load_limits(recipe, home)
     except TumblelineError as problem:

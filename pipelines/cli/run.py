@@ -177,7 +177,7 @@ DOES = {
     "grade": "deciding by the limits",
     "report": "drawing the report",
 }
-"""What each stage does, for the progress line."""
+"""The action of each stage, for the progress line."""
 
 
 @contextmanager

@@ -27,7 +27,7 @@ NOTES = {
         "measurement: bias_record_u_ug of the table wander"
     )
 }
-"""What the columns of a table mean where their names alone mislead."""
+"""Meaning of the columns of a table whose names alone mislead."""
 
 
 def command(

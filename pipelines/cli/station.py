@@ -151,7 +151,7 @@ def _of_machine() -> list[dict[str, Any]]:
 
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 SETTINGS = re.compile(r"[,:;(]| with | behind ")
-"""What stands between the name of a model and the required settings of the device."""
+"""Words between the name of a model and the required settings of the device."""
 
 
 SERVING = {

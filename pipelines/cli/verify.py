@@ -176,7 +176,7 @@ def _print_checked(file: CheckedFile) -> None:
 
 
 def _needed(file: CheckedFile) -> str:
-    """What would prove the origin: an archive proves the values of an XML, and nothing of the pages of a PDF."""
+    """How the origin can be proven: an archive proves the values of an XML, and nothing of the pages of a PDF."""
     signed = any(check.check == "signature" and check.state == "good" for check in file.checks)
     if file.path.suffix.lower() == ".pdf" and not signed:
         return "the pages of an unsigned PDF cannot be proven: give its XML with --archive, or ask for a signed PDF"

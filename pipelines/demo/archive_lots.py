@@ -31,7 +31,7 @@ _TAU_S = (100.0, 800.0, 6400.0)
 
 @dataclass(frozen=True)
 class Hidden:
-    """What makes lots of one wafer differ: the spring of their devices.
+    """The hidden physics: the spring of the devices of one wafer.
 
     hardening : k₃ of a restoring force x + k₃x³, 1/g²: the output falls behind a force f by about k₃f³
     """
@@ -102,7 +102,7 @@ class Line:
         return np.cumsum(step)
 
     def _unit(self, serial: str, wafer: str, force: Array, time: Array, temperature: Array) -> dict[str, Array | str]:
-        """What a device puts out, g: spring, misalignment, bias and scale that follow its temperature, noise."""
+        """Output of a device, g, of spring, misalignment, bias and scale that follow its temperature, noise."""
         rng = self._rng
         turned = np.eye(3) + 2e-3 * rng.standard_normal((3, 3))
         along = force @ turned.T
@@ -151,7 +151,7 @@ BEGIN = datetime(2026, 1, 5, 6, tzinfo=UTC)
 
 @dataclass(frozen=True)
 class DemoArchive:
-    """What was written: the archive, and the table of what is known of its units."""
+    """The files written: the archive, and the table of the attributes of its units."""
 
     folder: Path
     units: Path

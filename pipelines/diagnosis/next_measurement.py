@@ -26,7 +26,7 @@ BREAKER_POSE = (0.0, 0.0, 25.0)
 
 @dataclass(frozen=True)
 class Proposed:
-    """What to measure next, in order: steps that separate classes of several effects, then steps that show unseen effects.
+    """The next measurements, in order: steps that separate classes of several effects, then steps that show unseen effects.
 
     parting : classes, each with None if no steps of the station are certain to separate it
     twins : per class, the members that no measurement of the station separates from its best member, and that member
@@ -81,7 +81,7 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
 
 
 def _breaker(group: EffectClass) -> dict[str, Any]:
-    """What separates a class, as text, if no steps of the station do."""
+    """A row without steps that states what separates a class which no steps of the station separate."""
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
     steps = "" if group.of_data else "no steps of the station are certain to separate them; needed:  "

@@ -188,7 +188,7 @@ def tails_left_out(document: dict[str, Any]) -> str:
 
 
 def left_out(document: dict[str, Any]) -> list[str]:
-    """What was left out of the judgement, and what the verdict is without it."""
+    """Sentences on dwells that were left out of the judgement, and on the verdict without them."""
     removed = document.get("removed")
     count = len(removed["dwells"]) if removed and not removed["heavy_tails"] else 0
     were = "s were" if count > 1 else " was"
@@ -229,7 +229,7 @@ def not_listed(document: dict[str, Any]) -> str:
 
 
 def unexplained_text(document: dict[str, Any]) -> str:
-    """What the residual follows without an effect of the catalogue that explains it; empty where there is nothing."""
+    """The quantity that the residual follows without an effect of the catalogue that explains it; empty where there is none."""
     unexplained = document["unexplained"]
     if not unexplained:
         return ""
@@ -245,7 +245,7 @@ def not_recorded(reason: str) -> str:
 
 
 def _without_angles(document: dict[str, Any]) -> str:
-    """What could not be tried because the angles of the table are not recorded, as a sentence to add; empty where they are."""
+    """A sentence on effects that could not be tried without the angles of the table; empty where they are recorded."""
     reasons = document.get("reasons", {})
     names = [name for name in document["unseen"] if not_recorded(reasons.get(name, "")) == "outer_deg"]
     if not names:

@@ -131,7 +131,7 @@ def _text(value: object) -> str:
 
 
 def sentences(added: AddedAttributes) -> list[str]:
-    """What was added, for people."""
+    """Sentences on the attributes that were added."""
     what = ", ".join(added["names"])
     new = number_of(added["added"], "new value")
     lines = [f"{what}: {new}, {added['changed']} changed, {added['unchanged']} as before"]
@@ -147,7 +147,7 @@ _EXAMPLES = 4
 
 
 def added_from(archive: Archive, path: Path, by: str) -> tuple[AddedAttributes, list[str]]:
-    """What a file adds, and the same in sentences.
+    """Add the attributes of a file to an archive; the counts, and sentences that state them.
 
     Raises
     ------

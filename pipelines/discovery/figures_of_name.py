@@ -83,7 +83,7 @@ def without_largest(carried: Array) -> float:
 
 
 def next_of(driver: str, scope: Scope) -> str:
-    """What to measure or do next."""
+    """The next action: a measurement, or a change of the model."""
     if scope == "sensor_or_station":
         return "measure some of the same units on another station: what stays with the units is theirs"
     if driver == SLOT:
@@ -103,7 +103,7 @@ _SCOPES = {
 
 
 def headline(row: DiscoveryRow) -> str:
-    """What, by what, how large, since when."""
+    """Effects, driver, size and first night of a discovery in one line."""
     effects = " or ".join(row["effects"][:3]) + (" or …" if len(row["effects"]) > 3 else "")
     what = "is common to all lots" if row["kind"] == "mean" else f"{_KINDS[row['kind']]} {' or '.join(row['drivers'])}"
     low, high = row["interval_ug"]
@@ -115,7 +115,7 @@ def headline(row: DiscoveryRow) -> str:
 
 
 def scope_text(row: DiscoveryRow) -> str:
-    """Whose it is and why that is said, with the level that differs most."""
+    """Scope of a discovery and its reason, with the level that differs most."""
     text = f"{_SCOPES[row['scope']]}: {row['because']}"
     if row["kind"] == "levels" and row["levels"]:
         top = row["levels"][0]

@@ -1,4 +1,4 @@
-"""What the evidence of an archive amounts to: named discoveries with size, scope and what carries them, and what is held back."""
+"""Findings of the evidence of an archive: named discoveries with size, scope and support, and evidence that is held back."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -217,7 +217,7 @@ class Findings(Alarms):
         return row
 
     def _scope(self, found: Discovery) -> tuple[Scope, str]:
-        """Whether the sensor or the station has it, and why that is said."""
+        """Scope of a discovery (sensor, station, or either), and its reason."""
         driver, stations = found.drivers[0], len(self.state.sensor.wander.stations)
         if driver in _BY_DRIVER:
             return _BY_DRIVER[driver]
@@ -269,7 +269,7 @@ class Findings(Alarms):
         return list(rows.values())
 
     def _unnamed_row(self, driver: str, axis: str, nearest: str) -> UnexplainedRow:
-        """What differs by a driver without a map of it."""
+        """The row of a difference by a driver that no effect explains, without a map."""
         alarms = [a for a in self._of_sensor if plain(a.driver) == driver]
         since = min(alarms, key=lambda a: a.lots)
         return {
@@ -285,7 +285,7 @@ class Findings(Alarms):
         }
 
     def _map_row(self, of: Unnamed) -> UnexplainedRow:
-        """What is left by a driver over the poses of the newest lot, on the axis where it stands out most."""
+        """That row with a map over the poses of the newest lot, on the axis where the difference is clearest."""
         force = self.source.poses(self.state.order[-1])
         maps = [map_of(force, *fit) for fit in zip(of.size, of.covariance, strict=True)]
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))

@@ -34,7 +34,7 @@ _DECIMALS = 3  # of a force in g, to which poses are the same
 
 
 class DiscoveryArchive:
-    """What the discovery of an archive works on.
+    """The lots of an archive as the discovery takes them.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class DiscoveryArchive:
 
     @cached_property
     def attributes(self) -> Attributes:
-        """What is known of units and runs."""
+        """The attributes of units and runs."""
         return known_attributes(self.archive)
 
     @cached_property
@@ -197,7 +197,7 @@ class DiscoveryArchive:
         return out
 
     def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:
-        """What earlier measurements of a unit say, inside their lots.
+        """A function that gives score and information of earlier measurements of a unit, inside their lots.
 
         Parameters
         ----------

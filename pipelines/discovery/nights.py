@@ -54,11 +54,11 @@ def grown_by_days(source: DiscoveryArchive, state: Evidences, runs: Sequence[str
         generation = 1 + max(state.generations.values(), default=-1)
         for driver in state.sensor.drivers:
             state.generations.setdefault(driver, generation)
-        state.alarms += state.unknown(_beyond(state))
+        state.alarms += state.unknown(_raised(state))
     return state
 
 
-def _beyond(state: Evidences) -> list[Alarm]:
+def _raised(state: Evidences) -> list[Alarm]:
     """Hypotheses beyond the threshold; the indices of those of the station follow those of the sensor."""
     out: list[Alarm] = []
     for evidence, of_station in ((state.sensor, False), (state.station, True)):
@@ -205,7 +205,7 @@ def discovered_before(archive: Archive) -> list[tuple[str, int]]:
 
 
 def _found(folder: Place) -> dict[str, Any] | None:
-    """What was found of a kind of device the last time, and of how many lots."""
+    """The stored findings of a kind of device, and their number of lots; None where there are none."""
     path = folder / "found"
     if not path.is_file():
         return None

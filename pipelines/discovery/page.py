@@ -64,7 +64,7 @@ def levels_chart(row: DiscoveryRow) -> Chart:
 
 
 def map_chart(row: UnexplainedRow) -> Chart:
-    """What differs by a driver and is no effect of the catalogue, over the sphere of the force."""
+    """A difference by a driver that no effect of the catalogue explains, over the sphere of the force."""
     outer, inner, size, error = np.array(row["map"]).T
     force = force_from_angles(np.radians(outer), np.radians(inner))
     texts = tuple(

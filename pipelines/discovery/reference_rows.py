@@ -17,7 +17,7 @@ PROPORTIONAL = (
 
 
 def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
-    """What changes the force itself, for all units of a lot alike."""
+    """The row of an error of the station, which changes the force itself for all units of a lot."""
     effect, column, _ = hypothesis(known.state, alarm.index)
     at = alarm.index - known.state.sensor.size
     station = known.state.station
@@ -54,7 +54,7 @@ def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
 
 
 def thermometer_row(known: Alarms) -> DiscoveryRow:
-    """What an error of the thermometer does to every unit by its own temperature coefficient."""
+    """The row of an error of the thermometer, which every unit shows by its temperature coefficient."""
     alarms, k = known.of_thermometer, len(known.state.columns)
     effect = known.effect_of(alarms[0])
     sums = known.state.sensor.levels[OWN_TEMPCO + INSIDE]

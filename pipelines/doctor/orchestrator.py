@@ -25,7 +25,7 @@ LARGEST_BODY = 65536
 
 
 class ServerAnswer(NamedTuple):
-    """What a server answered; ``ahead_s``: of its clock against the host's, None where it states no time."""
+    """The answer of a server; ``ahead_s``: its clock less that of the host, None where it states no time."""
 
     status: int
     body: str

@@ -206,7 +206,7 @@ def _legend_names(chart: Chart) -> list[tuple[str, str]]:
 
 
 def _mark(trace: Trace) -> str:
-    """What a trace looks like, about the origin."""
+    """The symbol of a trace for the legend, about the origin, as SVG."""
     colour = ROLES[trace.role]
     if trace.style == "line":
         dash = ' stroke-dasharray="5 3"' if trace.dashed else ""

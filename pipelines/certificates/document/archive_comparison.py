@@ -25,7 +25,7 @@ NONE = ("", "", "")
 
 @dataclass(frozen=True)
 class Compared:
-    """What the archive says of a certificate.
+    """The comparison of a certificate with the archive.
 
     known : whether the ledger has its number; ended : why it is not valid any more, empty where it is
     until : until when it is valid and what comes then, where that is known already
@@ -44,7 +44,7 @@ class Compared:
 
 
 def compare(root: Any, facts: CertificateFacts, archive: Archive, who: LaboratoryFile | None = None) -> Compared:
-    """What the archive says of a certificate.
+    """The comparison of a certificate with the archive.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def _made_again(
 
 
 def _other_entry(facts: CertificateFacts, calibration: Calibration) -> tuple[str, ...]:
-    """What of a document differs from its entry in the ledger, where the document cannot be made again."""
+    """Differences of a document from its entry in the ledger, where the document cannot be made again."""
     entries = (
         ("run", facts.run, calibration.run),
         ("SHA-256 of the coefficients", facts.coefficients, calibration.event.coefficients),

@@ -18,7 +18,7 @@ from schemas.units import MICRO
 
 
 def adjustment(run: Run, calibration: Calibration, known: list[Calibration]) -> Adjustment:
-    """What the earlier calibration of a unit makes of the readings of this one, in the error of the norm of gravity.
+    """Error of the norm of gravity of the readings of a calibration, with the coefficients as found and as left.
 
     The norm needs no angle: a unit that sits otherwise in the fixture than before has no error by that.
 

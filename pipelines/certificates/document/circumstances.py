@@ -1,4 +1,4 @@
-"""What a certificate says of the circumstances of a calibration: standards, traceability, method, conditions, omissions."""
+"""Texts of a certificate on the circumstances: standards, traceability, method, conditions, omissions."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -48,7 +48,7 @@ def standard_of(reference: Reference) -> content.ReferenceStandard:
 
 
 def entries_of(run: Run, covers: str) -> dict[str, bool]:
-    """What the results rest on in [uncertainty], and whether it names a standard; of several bands all must."""
+    """The entries of [uncertainty] that the results rest on, and whether each names a standard; of several bands all must."""
     terms = Uncertainty.model_validate(run.manifest("budget")["parameters"].get("uncertainty") or {})
     named: dict[str, bool] = {}
     roles = {STATIC if kind == STATIC else PROCEDURES[kind].roles[0] for kind in covers.split()}
@@ -61,7 +61,7 @@ def entries_of(run: Run, covers: str) -> dict[str, bool]:
 
 
 def traceability(budget: StatedBudget, entries: dict[str, bool]) -> str:
-    """What is traceable and what is not: an entry of the budget that names no standard is said to rest on its source."""
+    """Statement of traceability; entries of the budget without a standard are listed with their source."""
     source = budget.grade_source.replace("_", " ")
     if not budget.references:
         return (
@@ -124,7 +124,7 @@ def _static_method(run: Run, recipe: dict[str, Any], lengths: str) -> str:
 
 
 def _of_earlier_calibrations(run: Run, serial: str) -> Iterator[str]:
-    """What earlier calibrations add to those of a unit; nothing without a prior."""
+    """A sentence on the weight of earlier calibrations of the unit; nothing without a prior."""
     table = run.table("prior") if "prior" in run.tables() else None
     prior = None if table is None else prior_document(table[table["unit"] == serial], run.about)
     if prior is not None:

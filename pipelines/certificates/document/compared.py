@@ -34,7 +34,7 @@ AMPLITUDES = {"sweep": "g peak", "random_vibration": "g rms", "transverse": "g p
 
 @dataclass
 class ComparedContent:
-    """What the comparisons of a unit add to its certificate.
+    """The parts of a certificate that come from the comparisons of a unit.
 
     budgets : quantities of the tables of the budget whose contributions are printed, with their words
     """

@@ -227,7 +227,7 @@ def _conformity(row: Row, letters: str) -> content.Conformity:
 
 
 def _grade_statement(budget: StatedBudget, grade: str) -> str:
-    """What the grade says of the item: a probability, by the distribution of its largest error."""
+    """Meaning of the grade as a probability, by the distribution of the largest error; empty without a grade."""
     quantiles = {row["axis"]: row["value"] for row, _ in budget.quantities if row["quantity"] == LARGEST_ERROR}
     if not quantiles or grade not in GRADES:
         return ""

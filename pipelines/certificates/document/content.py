@@ -1,4 +1,4 @@
-"""What a certificate says, as one document: paper and XML are written from it, and nothing is added there."""
+"""The content of a certificate as one document: paper and XML are written from it, and nothing is added there."""
 
 from collections.abc import Sequence
 

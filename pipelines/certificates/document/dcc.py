@@ -176,7 +176,7 @@ def _administrative(w: _Writer, parent: Any, c: CertificateContent) -> None:
 
 
 def statements_of(c: CertificateContent) -> list[str]:
-    """What a certificate declares beside its results."""
+    """The declarations of a certificate beside its results."""
     parts = [
         f"Date of issue: {c.issued}",
         "SIMULATED: the station that these results come from is a simulation; no device was measured"

@@ -57,7 +57,7 @@ class CheckedFile:
 
 @dataclass(frozen=True)
 class Against:
-    """What files are compared with.
+    """The references for a check of files.
 
     trusted : certificates that vouch for signers; archive : None for the files alone
     demanded : whether the archive must know the certificate: it was named for this check

@@ -67,7 +67,7 @@ class Written:
 
 @dataclass
 class Issued:
-    """What was written, and why not, by serial."""
+    """The certificates written; by serial, the reasons for units left out."""
 
     written: list[Written] = field(default_factory=list[Written])
     left_out: dict[str, str] = field(default_factory=dict[str, str])

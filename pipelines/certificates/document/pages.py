@@ -1,4 +1,4 @@
-"""What stands on the pages of a certificate: the texts and tables of its parts, with the numbers rounded."""
+"""Texts and tables on the pages of a certificate, with the numbers rounded."""
 
 import math
 from typing import Any

@@ -229,7 +229,7 @@ def facts_of(root: Any) -> CertificateFacts:
 
 
 def statements(root: Any) -> list[str]:
-    """What a document declares beside its results."""
+    """The declarations of a document beside its results."""
     return _all(root, "//dcc:statement/dcc:declaration/dcc:content/text()")
 
 

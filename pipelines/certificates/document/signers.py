@@ -76,7 +76,7 @@ def not_valid(certificate: Certificate, now: datetime) -> str:
 
 
 def time_of(signer: Signer) -> str:
-    """What is known of the time of signing: no time stamp of others is written or read here."""
+    """A sentence on the time of signing; time stamps of third parties are neither written nor read."""
     if signer.when is None:
         return "the signature states no time and has no time stamp"
     return f"the time of signing, {signer.when:%Y-%m-%d %H:%M} UTC, is the signer's own statement, without a time stamp"

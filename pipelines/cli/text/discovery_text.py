@@ -50,7 +50,7 @@ def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, 
 
 
 def _beside(document: DiscoverDocument) -> None:
-    """What is no discovery: unexplained evidence, what a model leaves, what may be the station's own wander."""
+    """Print what is no discovery: unexplained evidence, remainders of a model, evidence that may be wander of the station."""
     for found in document["unexplained"]:
         say(unexplained_text(found), style="yellow" if found["id"] in document["new"] else "")
     for comparison in document["compared"]:
@@ -122,7 +122,7 @@ def print_explained(row: DiscoveryRow | UnexplainedRow) -> None:
 
 
 def _reach(document: DiscoverDocument) -> None:
-    """What the archive could have shown, by effect."""
+    """Print the smallest size of each effect that the archive would have shown."""
     if not document["reach"]:
         return  # the warnings say how many lots are needed
     rows: dict[str, dict[str, str]] = {}

@@ -179,7 +179,7 @@ def _picture(recording: dict[str, Any]) -> None:
 
 
 def _missing(document: dict[str, Any]) -> None:
-    """What is missing, what was added, and the errors on dwells that were left out."""
+    """Print missing effects, added effects, and the errors on dwells that were left out."""
     for choice in document["choices"]:
         others = ", ".join(choice["not_separated_from"])
         alike = f" (these data do not separate it from {others})" if others else ""
