@@ -227,11 +227,11 @@ def _drop_old_states(source: Place, target: Place) -> None:
     """
     captures = target / "captures"
     for capture in captures.iterdir() if captures.is_dir() else ():
-        there = source / "captures" / capture.name
-        if _records(capture) > _records(there):
+        original = source / "captures" / capture.name
+        if _records(capture) > _records(original):
             continue
         for old in (capture / STATE).glob("*.bin") if (capture / STATE).is_dir() else ():
-            if not (there / STATE / old.name).is_file():
+            if not (original / STATE / old.name).is_file():
                 old.unlink(missing_ok=True)
 
 

@@ -60,9 +60,9 @@ def _left(root: Place) -> Iterator[Place]:
         return
     for top in (root, *(root / name for name in FOLDERS)):
         for folder, below, names in os.walk(top):
-            here = [name for name in (*below, *names) if name.startswith(files.TEMPORARY)]
-            below[:] = [] if top == root else [name for name in below if name not in here]
-            yield from (Path(folder) / name for name in sorted(here))
+            temporary = [name for name in (*below, *names) if name.startswith(files.TEMPORARY)]
+            below[:] = [] if top == root else [name for name in below if name not in temporary]
+            yield from (Path(folder) / name for name in sorted(temporary))
 
 
 def _remove(archive: Archive, path: Place, done: Cleaned, *, only_look: bool) -> None:

@@ -149,7 +149,7 @@ def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[Folde
     """The folders with files that no pack has as they are; files of killed writers, locks and young events are left out."""
     latest = time.time_ns() - int(LEAST_AGE_S * 1e9)
     for name in names:
-        there = known.folder(name)
+        folder = known.folder(name)
         single = dict(_single(root / name))
         if name.startswith(f"{LEDGER}/"):
             single = {
@@ -157,7 +157,7 @@ def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[Folde
                 for file, stamp in single.items()
                 if stamp[1] < latest and is_number(file.removesuffix(".json"))
             }
-        packed = {} if there is None else {file: (member.size, member.mtime_ns) for file, member in there.files.items()}
+        packed = {} if folder is None else {file: (entry.size, entry.mtime_ns) for file, entry in folder.files.items()}
         new = {file: stamp for file, stamp in single.items() if packed.get(file) != stamp}
         if new:
             yield FolderToPack(name, (root / name).stat().st_mtime_ns, new)

@@ -77,9 +77,9 @@ def _sealed_stages(run: Run, names: set[str]) -> list[str]:
     if SEALED not in names:
         return []
     seal = files.read_json(run.path / SEALED)
-    there = {name for name in names if name.endswith(".json") and name != SEALED}
+    manifests = {name for name in names if name.endswith(".json") and name != SEALED}
     named = {name.rpartition("/")[2] for name in seal["files"] if name.startswith("runs/")}
-    return seal.get("stages", []) if there == named else []
+    return seal.get("stages", []) if manifests == named else []
 
 
 GRADES, VERDICT = "grades", "verdict"

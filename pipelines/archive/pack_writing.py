@@ -111,7 +111,7 @@ def merge_packs(root: Path) -> dict[str, list[str]]:
 
 
 def due_of(sizes: Sequence[int]) -> int:
-    """How many of the newest packs are to be merged, of packs with these sizes in bytes, oldest first."""
+    """The number of the newest packs to be merged, of packs with these sizes in bytes, oldest first."""
     total, count = 0, 0
     for size in reversed(sizes):
         if count and (size > RATIO * total or total + size > LARGEST):

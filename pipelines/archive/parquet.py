@@ -49,9 +49,9 @@ def decoded(data: bytes, columns: Sequence[str] = ()) -> pa.Table:
     import pyarrow.parquet as pq
 
     file = pq.ParquetFile(pa.BufferReader(data))
-    some = columns and (file.schema_arrow.metadata or {}).get(SCHEMA_MARK) == str(VERSION).encode()
+    selects = columns and (file.schema_arrow.metadata or {}).get(SCHEMA_MARK) == str(VERSION).encode()
     # one small file: a data set reader with threads would take longer than the reading itself
-    return file.read(columns=list(columns) if some else None, use_threads=False)
+    return file.read(columns=list(columns) if selects else None, use_threads=False)
 
 
 def _remedy(path: Place) -> str:

@@ -53,7 +53,7 @@ class Events:
         return _table([{name: getattr(event, name) for name in columns} for event in self.recorded()], columns)
 
     def soaks(self) -> pd.DataFrame:
-        """How long each soak took, and overshoot of air and devices: the table ``soaks`` of the archive."""
+        """Duration of each soak, and overshoot of air and devices: the table ``soaks`` of the archive."""
         soaks = [event for event in self.recorded() if event.kind == "soak" and event.figures]
         rows = [{"time_s": soak.time_s, "record": soak.record, **soak.figures} for soak in soaks]
         return _table(rows, {"time_s": float, "record": "int64", **dict.fromkeys(SOAK_FIGURES, float)})

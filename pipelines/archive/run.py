@@ -83,7 +83,7 @@ class Run:
 
     @property
     def report(self) -> Place:
-        """Where the report for people lies."""
+        """Path of the report."""
         return self.path / "report.html"
 
     def has(self, names: tuple[str, ...], key: str) -> bool:

@@ -122,7 +122,7 @@ class ObjectPath:
         """Nothing: folders need not be made."""
 
     def resolve(self) -> ObjectPath:
-        """Itself: there are no links."""
+        """The path itself: an object store has no links."""
         return self
 
     def iterdir(self) -> Iterator[ObjectPath]:

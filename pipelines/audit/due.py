@@ -97,11 +97,11 @@ def certificates_of(root: Place, until: float, captures: Mapping[str, str]) -> C
     """
     day = date_of(until - 1.0)
     histories = histories_of(root)
-    of: dict[tuple[str, str], list[Calibration]] = {}
+    by_unit: dict[tuple[str, str], list[Calibration]] = {}
     for events in histories.units:
         for calibration in calibrations_of(event for event in events if event.when[:10] <= day):
-            of.setdefault((calibration.event.device.upper(), calibration.serial), []).append(calibration)
-    return Certificates(day, of, captures, histories.problems)
+            by_unit.setdefault((calibration.event.device.upper(), calibration.serial), []).append(calibration)
+    return Certificates(day, by_unit, captures, histories.problems)
 
 
 def _end(revoked: Calibration) -> float:

@@ -83,7 +83,7 @@ def _before(histories: Index, good: Flags) -> Index:
 
 
 def _foreign(values: Array, histories: Index, days: Array, scale: ChangeScale) -> Flags:
-    """Which calibrations do not fit the last fitting calibration before them."""
+    """Mask (m,) of the calibrations that do not fit the last fitting calibration before them."""
     foreign = np.zeros(len(values), dtype=bool)
     for _ in range(ROUNDS):
         before = _before(histories, ~foreign)
@@ -107,10 +107,10 @@ def _described(
     out: list[Stranger] = []
     for k in map(int, np.flatnonzero(foreign)):
         other, unit = _fits(k, values, foreign, histories, days, scale)
-        back = _exchanged(k, unit, values, foreign, histories, days, before, scale) if other >= 0 else False
+        exchanged = _exchanged(k, unit, values, foreign, histories, days, before, scale) if other >= 0 else False
         years = float(days[k] - days[before[k]]) / YEAR_D
         usual = float(np.sqrt(distance(values[k], values[before[k]], scale, years) / scale.count))
-        out.append(Stranger(int(rows[k]), usual, str(calibrations.unit[rows[other]]) if other >= 0 else "", back))
+        out.append(Stranger(int(rows[k]), usual, str(calibrations.unit[rows[other]]) if other >= 0 else "", exchanged))
     return out
 
 
@@ -155,8 +155,8 @@ def exchanged_pairs(
     bound = np.array([rules.tolerance_of(device, FAMILY_OF[name]) for name in NAMES])
     pairs, past = list[tuple[int, int, float]](), [int(rows[index]) for index in before]
     for run in np.unique(calibrations.run[rows[before >= 0]].astype(str)):
-        here = np.flatnonzero((calibrations.run[rows] == run) & (before >= 0))
-        far = [int(k) for k in here if not _within(calibrations, rows[k], past[k], bound)]
+        candidates = np.flatnonzero((calibrations.run[rows] == run) & (before >= 0))
+        far = [int(k) for k in candidates if not _within(calibrations, rows[k], past[k], bound)]
         apart = {k: (calibrations.values[rows[k]] - calibrations.values[past[k]]) / bound for k in far}
         pairs += [
             (k, other, float(np.sqrt(np.nanmean(apart[k][np.isfinite(bound)] ** 2))))

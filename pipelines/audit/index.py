@@ -143,8 +143,8 @@ def _refreshed(archive: Archive, folder: Place, distribute: Distributor | None, 
     small = [part for part, runs in good.items() if len(runs) < RUNS_PER_PART // 2]
     if len(small) > MOST_SMALL:
         good = {part: runs for part, runs in good.items() if part not in small}
-    there = {run for runs in good.values() for run in runs}
-    missing = in_order_of_disk(archive.root, list(stamps.keys() - there))
+    indexed = {run for runs in good.values() for run in runs}
+    missing = in_order_of_disk(archive.root, list(stamps.keys() - indexed))
     chunks = [missing[k : k + RUNS_PER_PART] for k in range(0, len(missing), RUNS_PER_PART)]
     root = address_of(archive.root)
     elsewhere = "" if folder == archive.root / FOLDER else str(folder)
@@ -152,7 +152,7 @@ def _refreshed(archive: Archive, folder: Place, distribute: Distributor | None, 
     names = map_partitions(make_part, portions, distribute, workers=workers, name="audit index")
     new = [folder / name for name in names]
     remove_parts(folder, set(parts) - set(good) - set(new))
-    return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
+    return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(indexed))
 
 
 def make_part(portion: Portion) -> str:

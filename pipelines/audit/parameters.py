@@ -76,8 +76,8 @@ def parameters_of(
         columns = zip(texts.values(), words, strict=True)
         if not all(word in known for (known, _), word in columns):
             return nothing, nothing
-        same = [numbers == known.index(word) for (known, numbers), word in zip(texts.values(), words, strict=True)]
-        chosen = np.flatnonzero(same[0] & same[1] & same[2])
+        masks = [numbers == known.index(word) for (known, numbers), word in zip(texts.values(), words, strict=True)]
+        chosen = np.flatnonzero(masks[0] & masks[1] & masks[2])
         value_and_error = nothing.copy(), nothing.copy()
         value_and_error[0][row[chosen]], value_and_error[1][row[chosen]] = value[chosen], error[chosen]
         return value_and_error

@@ -137,16 +137,16 @@ def evidence_chart(audit: Audit, finding: AuditFinding) -> Chart | None:
     numbers = finding.evidence
     parameter = str(numbers.get("parameter", ""))
     if finding.who == "station" and "where" in numbers:
-        same = (str(numbers["station"]), str(numbers["where"]), parameter)
+        key = (str(numbers["station"]), str(numbers["where"]), parameter)
         series = (
             candidate
             for candidate in (*audit.stations, *audit.slots)
-            if (candidate.station, candidate.where, candidate.parameter) == same
+            if (candidate.station, candidate.where, candidate.parameter) == key
         )
         return next((series_chart(candidate) for candidate in series), None)
     if "standard" in numbers:
-        same = (str(numbers["station"]), str(numbers["standard"]), parameter)
-        charts = (chart for chart in audit.charts if (chart.station, chart.standard, chart.parameter) == same)
+        key = (str(numbers["station"]), str(numbers["standard"]), parameter)
+        charts = (chart for chart in audit.charts if (chart.station, chart.standard, chart.parameter) == key)
         return next((control_chart(chart) for chart in charts), None)
     if not finding.units or len(finding.units) > len(UNIT_ROLES) or "run" not in numbers:
         return None

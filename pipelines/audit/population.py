@@ -38,7 +38,7 @@ def yields(calibrations: Calibrations, chosen: Flags) -> list[Share]:
     passed = calibrations.outcome[rows] == "pass"
     months = np.array([date_of(day)[:7] for day in calibrations.day[rows]], dtype=object)
     out: list[Share] = []
-    for of, names in (
+    for grouping, names in (
         ("all", np.full(rows.size, "all", dtype=object)),
         ("device", calibrations.device[rows]),
         ("station", calibrations.station[rows]),
@@ -47,7 +47,7 @@ def yields(calibrations: Calibrations, chosen: Flags) -> list[Share]:
         kinds, number = np.unique(names.astype(str), return_inverse=True)
         totals, good = np.bincount(number, minlength=kinds.size), np.bincount(number, passed, minlength=kinds.size)
         out += [
-            Share(of, str(n), int(g), int(t), fraction_interval(int(g), int(t)))
+            Share(grouping, str(n), int(g), int(t), fraction_interval(int(g), int(t)))
             for n, g, t in zip(kinds, good, totals, strict=True)
         ]
     return out

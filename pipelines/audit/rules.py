@@ -107,6 +107,6 @@ def _over(content: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """Tables merged key by key; later values replace earlier ones."""
     out = dict(content)
     for key, value in changes.items():
-        both = isinstance(value, dict) and isinstance(out.get(key), dict) and set(value) != {"max", "unit"}
-        out[key] = _over(out[key], value) if both else value
+        tables = isinstance(value, dict) and isinstance(out.get(key), dict) and set(value) != {"max", "unit"}
+        out[key] = _over(out[key], value) if tables else value
     return out

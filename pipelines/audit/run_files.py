@@ -143,8 +143,8 @@ def _packed_marks(root: Place) -> dict[str, dict[str, str]]:
 
 
 def _marks(packed: PackedFolder) -> dict[str, str]:
-    there = {name: packed.files[name] for name in WATCHED if name in packed.files}
-    return {name: f"{member.size}.{member.mtime_ns}" for name, member in there.items()}
+    members = {name: packed.files[name] for name in WATCHED if name in packed.files}
+    return {name: f"{member.size}.{member.mtime_ns}" for name, member in members.items()}
 
 
 def _names(folder: str) -> list[str]:

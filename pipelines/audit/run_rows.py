@@ -43,20 +43,20 @@ TABLES = ("runs", "units", "parameters", "station", "coefficients", "figures")
 RUN_FIELDS = ("run", "measured", "started", "recipe", "device", "station", "capture", "rerun_of", "problem", "stamp")
 
 
-def _kept(schema: pa.Schema) -> pa.Schema:
+def _indexed(schema: pa.Schema) -> pa.Schema:
     """Columns of a run's table in the index: the run first, texts not encoded."""
     return pa.schema([("run", _TEXT), *((f.name, _TEXT if f.type == _FEW else f.type) for f in schema)])
 
 
 SCHEMAS: Mapping[str, pa.Schema] = {
     "runs": pa.schema([(name, _TEXT) for name in RUN_FIELDS]),
-    "units": _kept(READ["grades"]),
+    "units": _indexed(READ["grades"]),
     "parameters": pa.schema(
         [("run", _TEXT), ("unit", _TEXT), *((f"{n}{end}", _NUMBER) for n in NAMES for end in ("", "_error"))]
     ),
     "station": pa.schema([("run", _TEXT), ("effect", _TEXT), ("name", _TEXT), ("value", _NUMBER), ("error", _NUMBER)]),
-    "coefficients": _kept(READ["coefficients"]),
-    "figures": _kept(READ["figures"]),
+    "coefficients": _indexed(READ["coefficients"]),
+    "figures": _indexed(READ["figures"]),
 }
 
 
@@ -107,8 +107,8 @@ def _about(files: RunFiles) -> dict[str, Any]:
 
 def _tables(files: RunFiles) -> dict[str, pa.Table]:
     """The existing tables of a run, checked against their manifests."""
-    there = [name for name in READ if f"{name}.parquet" in files.content]
-    return {name: _table(name, files.content) for name in there}
+    present = [name for name in READ if f"{name}.parquet" in files.content]
+    return {name: _table(name, files.content) for name in present}
 
 
 def _table(name: str, content: Mapping[str, bytes]) -> pa.Table:

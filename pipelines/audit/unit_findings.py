@@ -183,9 +183,9 @@ def twice(calibrations: Calibrations) -> dict[str, tuple[int, int]]:
     """Serials of two units, in order, with the rows of two calibrations that cannot be of one unit."""
     order = np.lexsort((calibrations.day, calibrations.unit.astype(str)))
     unit, device, station = (column[order] for column in (calibrations.unit, calibrations.device, calibrations.station))
-    same = unit[1:] == unit[:-1]
+    same_unit = unit[1:] == unit[:-1]
     close = (np.diff(calibrations.day[order]) < AT_ONCE_D) & (station[1:] != station[:-1])
     by_serial: dict[str, tuple[int, int]] = {}
-    for k in np.flatnonzero(same & ((device[1:] != device[:-1]) | close)):
+    for k in np.flatnonzero(same_unit & ((device[1:] != device[:-1]) | close)):
         by_serial.setdefault(str(unit[k]), (int(order[k]), int(order[k + 1])))
     return by_serial

@@ -51,14 +51,14 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
 def changed_tables(run: Run) -> list[str]:
     """Tables of the result of a run that are not as their manifests say, by their hashes."""
     names = names_in(run.path)
-    there = [name for name in TABLES if {f"{name}.parquet", f"{name}.json"} <= names]
-    return [name for name in there if files.sha256(run.path / f"{name}.parquet") != run.manifest(name)["sha256"]]
+    present = [name for name in TABLES if {f"{name}.parquet", f"{name}.json"} <= names]
+    return [name for name in present if files.sha256(run.path / f"{name}.parquet") != run.manifest(name)["sha256"]]
 
 
 def library_remarks(run: Run) -> list[str]:
     """Libraries with more than one version among the tables of the run."""
-    there = [name for name in run.tables() if (run.path / f"{name}.json").is_file()]
-    return differing_libraries(run.id, {name: run.manifest(name) for name in there})
+    present = [name for name in run.tables() if (run.path / f"{name}.json").is_file()]
+    return differing_libraries(run.id, {name: run.manifest(name) for name in present})
 
 
 def _certificates(run: Run, serials: Iterable[str]) -> list[Place]:

@@ -1,4 +1,4 @@
-"""Which results by comparison of a run can be certified: those of sweep, random vibration, transverse and shock; and why not."""
+"""Results by comparison that can be certified (sweep, random vibration, transverse, shock), and why others cannot."""
 
 from typing import Any
 
@@ -129,7 +129,7 @@ def _unstated(rows: pd.DataFrame, terms: BudgetTerms) -> str:
     if not missing:
         return ""
     role = str(rows["role"].iloc[0])
-    settings = [at for every in missing.values() for at in every if np.isfinite(at)]
+    settings = [at for missing_at in missing.values() for at in missing_at if np.isfinite(at)]
     where = f" at {min(settings):.4g} to {max(settings):.4g} Hz" if settings else ""
     named = ", ".join(sorted(missing, key=TERMS.index))
     return (

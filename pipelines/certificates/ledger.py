@@ -83,8 +83,8 @@ class Ledger:
             if any(_same(calibration, event) for calibration in known):
                 return None
             refuse_other_device(known, event)
-            alike = [calibration for calibration in known if event.ends_others_of(calibration.event)]
-            ends = overlapped(alike, event.start, event.until, supersede=supersede)
+            same_kind = [calibration for calibration in known if event.ends_others_of(calibration.event)]
+            ends = overlapped(same_kind, event.start, event.until, supersede=supersede)
             return replace(event, action="supersede" if ends else "certify", ends=ends)
 
         written = self._append(event.serial, decided)

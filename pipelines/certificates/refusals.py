@@ -83,7 +83,7 @@ def nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: in
     """
     if not known:
         return f"revoke: unit {serial!r} has no calibration that holds, one is needed; see 'tumbleline show' with --at"
-    there = ", ".join(
+    listed = ", ".join(
         f"{calibration.certificate} ({calibration.start} to {calibration.until})" for calibration in known
     )
     what = (
@@ -91,4 +91,4 @@ def nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: in
         if certificate
         else f"a calibration of unit {serial} after {day or today()}"
     )
-    return f"revoke: there is no {what} that still holds; there are {there}"
+    return f"revoke: there is no {what} that still holds; there are {listed}"

@@ -58,8 +58,8 @@ def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
     for other in ledger.calibrations(event.serial):
         if not event.ends_others_of(other.event):
             continue
-        again = (other.run, other.start, other.until) == (event.run, event.start, event.until)
-        if other.event.sequence > seen and not again and other.start < event.until and event.start < other.until:
+        repeated = (other.run, other.start, other.until) == (event.run, event.start, event.until)
+        if other.event.sequence > seen and not repeated and other.start < event.until and event.start < other.until:
             raise WrongUse(
                 f"certify: unit {event.serial}: certificate {other.certificate} of run {other.run}, valid from {other.start} "
                 f"until {other.until}, was written by {other.event.who} while this command was at work; nothing was certified: "
@@ -69,15 +69,15 @@ def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
 
 def withdrawn(ledger: Ledger, event: LedgerEntry) -> str:
     """Why a unit is not certified again without a reason of its own: its last certificate of this run was revoked; else empty."""
-    alike = [
+    known = [
         calibration
         for calibration in ledger.calibrations(event.serial)
         if calibration.run == event.run and event.ends_others_of(calibration.event)
     ]
-    if not alike or not alike[-1].withdrawn:
+    if not known or not known[-1].withdrawn:
         return ""
     return (
-        f"certificate {alike[-1].certificate} of this run was revoked ({alike[-1].reason}); measure the unit again, or, if the "
+        f"certificate {known[-1].certificate} of this run was revoked ({known[-1].reason}); measure the unit again, or, if the "
         f"revocation was an error, certify it with --units {event.serial} --reason TEXT"
     )
 

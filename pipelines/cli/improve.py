@@ -169,8 +169,8 @@ class _Terminal(Attendant):
 
         question = f"Add {effect} to {target}?"
         if others:
-            alike = ", ".join(others)
-            question = f"These data do not separate {effect} from {alike}. Add the first, {effect}, to {target}?"
+            listed = ", ".join(others)
+            question = f"These data do not separate {effect} from {listed}. Add the first, {effect}, to {target}?"
         return agreed(question, CHOICES, UNATTENDED)
 
     def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:

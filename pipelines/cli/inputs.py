@@ -50,7 +50,7 @@ def add_effects(files: Sequence[Path] | None, formulas: Sequence[str] | None = N
 
 
 def distribution(store: Archive, runs: Sequence[str], dask: str, workers: int | None) -> tuple[Distributor | None, int]:
-    """How the work on runs is distributed over Dask, None for processes of this machine; and the number of processes."""
+    """The function that distributes work over Dask, None for processes of this machine; and the number of processes."""
     from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
 

@@ -71,7 +71,7 @@ def filter_of(text: str) -> tuple[str, float | None]:
 
 
 def included(given: Sequence[str] | None) -> dict[str, bool]:
-    """Which units ``--include`` adds: ``failed`` and ``revoked``, each whether it is named.
+    """The units that ``--include`` adds: ``failed`` and ``revoked``, each whether it is named.
 
     Raises WrongUse: another word.
     """

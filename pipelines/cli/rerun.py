@@ -69,10 +69,10 @@ def command(
         found = map_partitions(function, portions, distribute, workers=count, name=f"rerun of {counted}")
     done: list[Any] = [outcome for portion in found for outcome in portion]
     if check:
-        same = sum(result.same for result in done)
+        reproduced = sum(result.same for result in done)
         rows = [asdict(result) for result in done]
-        checks = {"archive": str(store.root), "selected": len(done), "same": same, "runs": rows}
-        conclude(checks, lambda _: _print_check(done), as_json=as_json, passed=same == len(done))
+        checks = {"archive": str(store.root), "selected": len(done), "same": reproduced, "runs": rows}
+        conclude(checks, lambda _: _print_check(done), as_json=as_json, passed=reproduced == len(done))
     add_runs(store, [outcome.new for outcome in done if outcome.new])
     document = {"archive": str(store.root), "runs": done, **_counts(done)}
     conclude(document, partial(_print, done, archive), as_json=as_json, passed=not document["failed"])
@@ -127,9 +127,9 @@ def _print_check(results: list[Reproduction]) -> None:
             unknown = "neither code nor libraries; the computer differs or the stored file is damaged"
             say(f"    changed since: {', '.join(result.changed) or unknown}")
     left = sum(how == "not checked" for result in results for how in result.tables.values())
-    same = sum(result.same for result in results)
+    reproduced = sum(result.same for result in results)
     say(
-        f"{same} of {number_of(len(results), 'run')} reproduced: {number_of(tables, 'table')} with the same bytes",
+        f"{reproduced} of {number_of(len(results), 'run')} reproduced: {number_of(tables, 'table')} with the same bytes",
         style="bold",
     )
     if left:

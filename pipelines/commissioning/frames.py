@@ -88,15 +88,15 @@ MOST_ROWS = 2_000
 
 def devices_of(recording: FrameFile) -> list[RecordedDeviceRow]:
     """The devices of a recording with the number of their exchanges."""
-    of = [(recording.device_of(exchange), exchange.reply is None) for exchange in recording.exchanges]
+    answers = [(recording.device_of(exchange), exchange.reply is None) for exchange in recording.exchanges]
     return [
         {
             "place": device.place,
             "link": device.link,
             "device_id": device.device_id,
             "profile": "" if device.profile is None else device.profile.name,
-            "exchanges": sum(asked == device for asked, _ in of),
-            "no_answer": sum(asked == device and silent for asked, silent in of),
+            "exchanges": sum(asked == device for asked, _ in answers),
+            "no_answer": sum(asked == device and silent for asked, silent in answers),
         }
         for device in recording.devices
     ]

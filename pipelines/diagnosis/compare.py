@@ -39,7 +39,7 @@ def compare(
     fresh_history: pd.DataFrame | None = None,
     before: Sequence[str] | None = None,
 ) -> dict[str, Any]:
-    """How well a model fits a lot, and a fresh run of the same units with the coefficients unchanged.
+    """Errors of a model in a lot, and in a fresh run of these units with the coefficients unchanged.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def compare(
     """
     try:
         with threadpool_limits(1):
-            again = None if fresh is None else measured(fresh, fresh_history)
-            return _compared(measured(dwells, history), effects, again, before)
+            remeasured = None if fresh is None else measured(fresh, fresh_history)
+            return _compared(measured(dwells, history), effects, remeasured, before)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
@@ -144,15 +144,15 @@ def _station(fitted: Estimate) -> list[dict[str, Any]]:
     ]
 
 
-def _same_units(first: Measured, again: Measured) -> Measured:
+def _same_units(first: Measured, fresh: Measured) -> Measured:
     """The fresh run with its units in the order of the first."""
-    strange = sorted(set(again.units) ^ set(first.units))
+    strange = sorted(set(fresh.units) ^ set(first.units))
     if strange:
         raise DataRejected(
             f"compare: {', '.join(strange[:5])} not in both runs, every unit is needed in both; "
             "give a fresh run of the same units, or leave the others out of both files"
         )
-    return again.pick([again.units.index(u) for u in first.units])
+    return fresh.pick([fresh.units.index(u) for u in first.units])
 
 
 def _by_pose(measurement: Measured, left: Array) -> list[dict[str, Any]]:

@@ -79,14 +79,14 @@ def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None
     gain = gains.get("blocks of time")
     falls: dict[Kind, tuple[float, float]] = {kind: _fall(before.missed[kind], after.missed[kind]) for kind in kinds}
     worst = min(kinds, key=lambda kind: falls[kind][0]) if kinds else None
-    both = (before.rms(set(kinds)), after.rms(set(kinds))) if kinds else (float("nan"), float("nan"))
+    errors = (before.rms(set(kinds)), after.rms(set(kinds))) if kinds else (float("nan"), float("nan"))
     rises = None
     if gain is None:
         against = "no judgement is possible"
     elif not gain > LEFT_OUT:  # a nan is no gain
         against = f"their log likelihood changes by {gain:+.1f}, more than {LEFT_OUT:g} is needed"
     else:
-        rises = _rise("the error on dwells left out", *both)
+        rises = _rise("the error on dwells left out", *errors)
         # the search for a fault of the run is the longest part: only where it decides
         against = rises or _disagreement(gains, falls) or doubt()
     return {
@@ -265,5 +265,5 @@ def _fall_text(progress: dict[str, Any]) -> str:
     if fall is None:
         return "the error cannot be judged on dwells left out"
     beside = {"base": "the coefficients of the earlier model", "bias": "the bias of each unit"}
-    again = beside.get(progress["estimated_again"] or "")
-    return fall_of(fall, progress["fall_u_ug"]) + (f" with {again} fitted to the fresh run anew" if again else "")
+    refitted = beside.get(progress["estimated_again"] or "")
+    return fall_of(fall, progress["fall_u_ug"]) + (f" with {refitted} fitted to the fresh run anew" if refitted else "")

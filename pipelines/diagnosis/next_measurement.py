@@ -46,11 +46,11 @@ class Proposed:
         """All proposals as rows, in order of measurement."""
         rows: list[dict[str, Any]] = []
         twins = [*self.twins, *[()] * (len(self.parting) - len(self.twins))]
-        for (group, measurement), alike in zip(self.parting, twins, strict=True):
-            rows += rows_of(measurement) if measurement is not None else [] if alike else [_breaker(group)]
-            if alike:  # what separates effects that are identical under every step of the station
-                needed = "; ".join(dict.fromkeys(catalogue.get(name).breaker for name in alike))
-                why = f"{' | '.join(alike)}: no measurement of this station separates them; needed: {needed}"
+        for (group, measurement), twin_ids in zip(self.parting, twins, strict=True):
+            rows += rows_of(measurement) if measurement is not None else [] if twin_ids else [_breaker(group)]
+            if twin_ids:  # what separates effects that are identical under every step of the station
+                needed = "; ".join(dict.fromkeys(catalogue.get(name).breaker for name in twin_ids))
+                why = f"{' | '.join(twin_ids)}: no measurement of this station separates them; needed: {needed}"
                 rows.append(_without_steps(why))
         return rows if self.showing is None else [*rows, *rows_of(self.showing)]
 
@@ -68,15 +68,15 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
     for named in (*diagnosis.handled, *diagnosis.named):
         if len(named.effects.members) > 1:
             # more poses do not separate handling errors from effects; the text of the handling error says what does
-            measurement, alike = None, ()
+            measurement, twin_ids = None, ()
             if not named.effects.of_data:
                 with suppress(MissingInput):  # a quantity that the run did not record
                     measurement = proposal(diagnosis.final, named.effects, around, already)
                 with suppress(MissingInput):
-                    alike = twins(diagnosis.final, named.effects, around)
+                    twin_ids = twins(diagnosis.final, named.effects, around)
             already += measurement.steps if measurement is not None else ()
             parting.append((named.effects, measurement))
-            twin.append(alike)
+            twin.append(twin_ids)
     return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already), tuple(twin))
 
 

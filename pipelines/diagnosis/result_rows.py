@@ -259,10 +259,10 @@ def noise_along(run: ExaminedRun) -> list[str]:
 
 def noise_of_the_lot(model: Model, units: int) -> list[str]:
     """A notice where the variance of the residuals is, for the greater part, common to all units."""
-    alike = correlation_of_units(model)
-    if alike < _ALIKE:
+    common = correlation_of_units(model)
+    if common < _ALIKE:
         return []
-    shared, single = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (alike, 1.0 - alike))
+    shared, single = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (common, 1.0 - common))
     text = f"of what remains {shared} µg are alike in all {units} units, {single} µg are each unit's own"
     return [f"{text}: look for the cause in what they share, such as table, fixture, reference or supply"]
 

@@ -221,7 +221,7 @@ def why_recommended(document: dict[str, Any]) -> list[str]:
 
 
 def not_listed(document: dict[str, Any]) -> str:
-    """How many effects this plan cannot show, or only in part; empty where it shows all."""
+    """A sentence with the number of effects that this plan cannot show, or only in part; empty where it shows all."""
     part = len({row["effect"] for row in document.get("unseen_in_part", ())})
     counts = (("cannot show {}", len(document["unseen"])), ("shows {} only in part", part))
     told = [what.format(number_of(count, "effect")) for what, count in counts if count]

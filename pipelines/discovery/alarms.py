@@ -39,8 +39,8 @@ class Alarms:
             at = np.array([index[column] for column in product.columns if column in index])
             if at.size != len(product.columns):
                 continue
-            here = (np.arange(AXES)[:, None] * k + at).reshape(-1)
-            lot[np.ix_(here, here)] += product.runs * product.lot
+            indices = (np.arange(AXES)[:, None] * k + at).reshape(-1)
+            lot[np.ix_(indices, indices)] += product.runs * product.lot
             inside[:, at[:, None], at] += product.runs * product.inside
             size[:, at] += product.runs * product.size.reshape(AXES, -1)
             weight[at] += product.runs

@@ -55,12 +55,12 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
                 new.setdefault(subject, {})[name] = value
     file = _append(archive, {"by": by, "source": source, "values": new, **provenance()}) if new else ""
     infos = archive.runs()
-    there = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
+    present = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
     return {
         **counts,  # type: ignore[typeddict-item]  # the three counts
         "by": by,
         "names": names,
-        "unknown": [subject for subject in values if subject not in there],
+        "unknown": [subject for subject in values if subject not in present],
         "refused": refused,
         "file": file,
     }
@@ -175,13 +175,15 @@ def listed(archive: Archive) -> ListedAttributes:
     """Every attribute: of units or runs, for how many it is known, how many levels it has, some of them."""
     known = known_attributes(archive)
     rows: list[KnownAttribute] = []
-    for kind, of in (("units", known.serial), ("runs", known.run)):
-        names = dict.fromkeys(name for values in of.values() for name in values)
+    for kind, by_key in (("units", known.serial), ("runs", known.run)):
+        names = dict.fromkeys(name for values in by_key.values() for name in values)
         for name in names:
-            values = [texts[name] for texts in of.values() if name in texts]
+            values = [texts[name] for texts in by_key.values() if name in texts]
             levels = sorted(set(values))
-            some = _some(levels, _EXAMPLES)
-            rows.append({"attribute": name, "of": kind, "known": len(values), "levels": len(levels), "such_as": some})
+            examples = _some(levels, _EXAMPLES)
+            rows.append(
+                {"attribute": name, "of": kind, "known": len(values), "levels": len(levels), "such_as": examples}
+            )
     return {"attributes": rows}
 
 

@@ -24,8 +24,8 @@ def populations(archive: Archive, device: str, workers: int = 1) -> list[Populat
     """Coefficients whose units are two populations, and pairs that correlate: each unit once, by its first calibration."""
     index = up_to_date(archive, workers=workers)
     runs = first_runs(dated_runs(index), np.inf)
-    every = load(index, runs)
-    of_kind = every.chosen(every.device.astype(str) == device)
+    calibrations = load(index, runs)
+    of_kind = calibrations.chosen(calibrations.device.astype(str) == device)
     order = np.argsort(of_kind.day, kind="stable")
     first = of_kind.chosen(order[np.unique(of_kind.unit[order].astype(str), return_index=True)[1]])
     judged = [name for name in NAMES if FAMILIES[FAMILY_OF[name]].of_unit]

@@ -84,8 +84,10 @@ class Evidences:
         of_column = numbered(self.columns)
         columns = np.bincount(of_column)
         effect_share = np.where(columns > _MOST_COLUMNS, 0.0, 0.5)
-        each = np.concatenate([np.tile(((1.0 - effect_share) / (AXES * columns))[of_column], AXES), effect_share])
-        return np.where(each > 0.0, np.log(columns.size / share) - np.log(np.where(each > 0.0, each, 1.0)), np.inf)
+        shares = np.concatenate([np.tile(((1.0 - effect_share) / (AXES * columns))[of_column], AXES), effect_share])
+        return np.where(
+            shares > 0.0, np.log(columns.size / share) - np.log(np.where(shares > 0.0, shares, 1.0)), np.inf
+        )
 
     @property
     def least_needed(self) -> float:

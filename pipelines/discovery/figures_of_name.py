@@ -31,10 +31,10 @@ def by_axis(name: Name) -> list[float]:
 
 def _squares(name: Name) -> tuple[Array, Array, Array]:
     """Shares of the levels (g, 1); errors of the sizes, zero where one is not known, and their squares less noise, (g, axes)."""
-    there = np.isfinite(name.errors)
-    errors = np.where(there, name.errors, 0.0)
+    finite = np.isfinite(name.errors)
+    errors = np.where(finite, name.errors, 0.0)
     weight = name.weights / max(float(name.weights.sum()), 1e-300)
-    return weight[:, None], errors, np.where(there, name.sizes**2 - errors**2, 0.0)
+    return weight[:, None], errors, np.where(finite, name.sizes**2 - errors**2, 0.0)
 
 
 def size_of(name: Name) -> tuple[float, float, float]:

@@ -41,7 +41,7 @@ _BY_DRIVER: dict[str, tuple[Scope, str]] = {
     SLOT: ("station", "it stays with the slot of the fixture while the units change"),
     UNIT: ("sensor", "the same unit shows it again, beside other units of its lot"),
 }
-"""Whose a discovery is by its driver alone, and why."""
+"""Scope of a discovery that follows from its driver alone, and the reason."""
 
 
 @dataclass(frozen=True)
@@ -182,9 +182,11 @@ class Findings(Alarms):
         of_thermometer = {self.effect_of(alarm) for alarm in self.of_thermometer} & set(name.effects)
         scope, because = ("thermometer", PROPORTIONAL) if of_thermometer else self._scope(found)
         driver = found.drivers[0] if name.drivers[0] not in found.drivers else name.drivers[0]
-        sums = [of for driver, of in self.state.sensor.drivers.items() if plain(driver) in found.drivers]
+        sums = [
+            driver_sums for driver, driver_sums in self.state.sensor.drivers.items() if plain(driver) in found.drivers
+        ]
         indices = [*self._indices(name.effects[0]), self.state.sensor.count + self.pool.effects.index(name.effects[0])]
-        log_e = max(float(of.log_e[indices].max()) for of in sums)
+        log_e = max(float(driver_sums.log_e[indices].max()) for driver_sums in sums)
         sizes = by_axis(name)
         row: DiscoveryRow = {
             "id": "",
@@ -262,7 +264,7 @@ class Findings(Alarms):
 
     def _unexplained(self, *, named: bool) -> list[UnexplainedRow]:
         """Functions of the pose that no effect is; and, where nothing is named, every driver with an alarm."""
-        rows = {of.driver: self._map_row(of) for of in self._named[1]}
+        rows = {unnamed.driver: self._map_row(unnamed) for unnamed in self._named[1]}
         for alarm in [] if named else sorted(self._of_sensor, key=self.log_e, reverse=True):
             effect, _, axis = hypothesis(self.state, alarm.index)
             rows.setdefault(plain(alarm.driver), self._unnamed_row(plain(alarm.driver), axis, effect))
@@ -284,19 +286,21 @@ class Findings(Alarms):
             "nearest": nearest,
         }
 
-    def _map_row(self, of: Unnamed) -> UnexplainedRow:
+    def _map_row(self, unnamed: Unnamed) -> UnexplainedRow:
         """That row with a map over the poses of the newest lot, on the axis where the difference is clearest."""
         force = self.source.poses(self.state.order[-1])
-        maps = [map_of(force, *fit) for fit in zip(of.size, of.covariance, strict=True)]
+        maps = [map_of(force, *fit) for fit in zip(unnamed.size, unnamed.covariance, strict=True)]
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
-        row = self._unnamed_row(of.driver, "xyz"[best], self._nearest(of.driver))
-        row["level"] = of.level
+        row = self._unnamed_row(unnamed.driver, "xyz"[best], self._nearest(unnamed.driver))
+        row["level"] = unnamed.level
         row["map"] = np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist()
         return row
 
     def _nearest(self, driver: str) -> str:
         """The effect of the catalogue with the largest evidence by a driver."""
-        log_e = np.max([of.log_e for name, of in self.state.sensor.drivers.items() if plain(name) == driver], axis=0)
+        log_e = np.max(
+            [sums.log_e for name, sums in self.state.sensor.drivers.items() if plain(name) == driver], axis=0
+        )
         places = [at for at in range(log_e.size) if hypothesis(self.state, at)[0] != SHAPE]
         return hypothesis(self.state, max(places, key=lambda at: float(log_e[at])))[0]
 
@@ -314,9 +318,9 @@ class Findings(Alarms):
             sizes = np.where(seen, times * noise / np.sqrt(np.where(seen, information, 1.0)) * self.pool.size, np.nan)
             for effect in self.pool.effects:
                 of_effect = sizes[self._indices(effect)]
-                there = of_effect[np.isfinite(of_effect) & (of_effect > 0.0)]
-                if there.size:
-                    smallest = MICRO * float(np.median(there))
+                visible = of_effect[np.isfinite(of_effect) & (of_effect > 0.0)]
+                if visible.size:
+                    smallest = MICRO * float(np.median(visible))
                     needed = max(FIRST, int(np.ceil(lots * smallest**2)))
                     rows.append({"effect": effect, "driver": driver, "smallest_ug": smallest, "lots_to_1_ug": needed})
         return rows
@@ -337,10 +341,10 @@ class Findings(Alarms):
     def _drivers(self) -> list[DriverRow]:
         judged = list(dict.fromkeys(map(plain, self.state.sensor.drivers)))
         rows: list[DriverRow] = [{"name": name, "status": "judged"} for name in judged]
-        known = [of for by in (self.source.attributes.serial, self.source.attributes.run) for of in by.values()]
+        known = [values for by in (self.source.attributes.serial, self.source.attributes.run) for values in by.values()]
         for name in self.source.attributes.names():
             if name not in judged:
-                levels = {value for of in known if (value := of.get(name))}
+                levels = {value for values in known if (value := values.get(name))}
                 status = "one level" if len(levels) < 2 else "no unit of a pooled lot has it"
                 rows.append({"name": name, "status": status})
         return rows

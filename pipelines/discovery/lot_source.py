@@ -136,11 +136,11 @@ class DiscoveryArchive:
         index = {column: at for at, column in enumerate(self.columns[0])}
         at = np.array([index[column] for column in run.columns])
         k, own_k = len(self.columns[0]), len(run.columns)
-        here = (np.arange(AXES)[:, None] * k + at).reshape(-1)
+        indices = (np.arange(AXES)[:, None] * k + at).reshape(-1)
 
         def spread(values: Array) -> Array:
             out = np.zeros((*values.shape[:-1], AXES * k))
-            out[..., here] = values.reshape(*values.shape[:-1], AXES * own_k)
+            out[..., indices] = values.reshape(*values.shape[:-1], AXES * own_k)
             return out
 
         levels, numbers = self._drivers(run)
@@ -163,10 +163,10 @@ class DiscoveryArchive:
 
     def _of_station(self, run: ScoredRun) -> ScoredLot:
         index = {column: at for at, column in enumerate(self.columns[1])}
-        both = np.zeros((2, len(index)))
+        sums = np.zeros((2, len(index)))
         if run.station_scores is not None:
-            both[:, [index[column] for column in run.of_station]] = run.station_scores
-        score, information = both
+            sums[:, [index[column] for column in run.of_station]] = run.station_scores
+        score, information = sums
         return ScoredLot(run.run, run.station, _day(run.when), ("",), score[None], information[None], information)
 
     def _drivers(self, run: ScoredRun) -> tuple[dict[str, tuple[str, ...]], dict[str, Array]]:
@@ -192,7 +192,7 @@ class DiscoveryArchive:
         for name in self.attributes.names():
             if name in {MEAN, STATION, SLOT, UNIT, "date"}:
                 continue
-            every = (of.values() for of in (self.attributes.serial, self.attributes.run))
+            every = (by_key.values() for by_key in (self.attributes.serial, self.attributes.run))
             out[name] = as_numbers([value.get(name, "") for values in every for value in values])
         return out
 
@@ -210,11 +210,11 @@ class DiscoveryArchive:
             nonlocal known
             for number in range(known, len(order)):
                 for serial in self.store.head(order[number])["units"]:
-                    there = index.setdefault(serial, number)
-                    if isinstance(there, list):
-                        there.append(number)
-                    elif there != number:
-                        index[serial] = [there, number]
+                    lot_numbers = index.setdefault(serial, number)
+                    if isinstance(lot_numbers, list):
+                        lot_numbers.append(number)
+                    elif lot_numbers != number:
+                        index[serial] = [lot_numbers, number]
             known = len(order)
             lots_of = index.get(unit, [])
             before = [order[k] for k in (lots_of if isinstance(lots_of, list) else [lots_of]) if k < taken]

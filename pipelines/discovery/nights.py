@@ -105,8 +105,8 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
             grown.taken_out, grown.night = [*state.taken_out, *gone], state.night
             grown.alarms = [*state.alarms, *state.unknown(grown.alarms)]
             state = grown
-        there = {*state.order, *state.taken_out}
-        new = [run for run in source.pooled() if run not in there and run not in source.revoked]
+        counted = {*state.order, *state.taken_out}
+        new = [run for run in source.pooled() if run not in counted and run not in source.revoked]
         if new or gone:
             before = state.night
             state = grown_by_days(source, state, new)
@@ -234,12 +234,12 @@ def remembered(
     for row in rows:
         row["id"] = ""
     # the same effects first; then what was unexplained and has a name now, or the other way round
-    for alike in (_effects_in_common, lambda old, new: not _effects(old) or not _effects(new)):
+    for matches in (_effects_in_common, lambda old, new: not _effects(old) or not _effects(new)):
         for row in (row for row in rows if not row["id"]):
-            same = next((old for old in left if old["driver"] == row["driver"] and alike(old, row)), None)
-            if same is not None:
-                left.remove(same)
-                row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
+            earlier = next((old for old in left if old["driver"] == row["driver"] and matches(old, row)), None)
+            if earlier is not None:
+                left.remove(earlier)
+                row["id"], row["since"], row["lots_then"] = earlier["id"], earlier["since"], earlier["lots_then"]
     for row in (row for row in rows if not row["id"]):
         row["id"] = f"D{stored['ids'] + len(document['new']) + 1}"
         document["new"].append(row["id"])

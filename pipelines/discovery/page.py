@@ -79,7 +79,7 @@ def map_chart(row: UnexplainedRow) -> Chart:
 
 
 def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, Chart]:
-    """How the evidence of each discovery came together from lot to lot, by ``grown-<id>``."""
+    """Growth of the evidence of each discovery from lot to lot, by ``grown-<id>``."""
     known = {(discovery.name.effects[0], discovery.drivers[0]): discovery.carried for discovery in findings.discoveries}
     charts: dict[str, Chart] = {}
     for row in document["discoveries"]:

@@ -176,7 +176,7 @@ def written(runs: Sequence[ScoredRun]) -> bytes:
     for name in ("score", "own", "information", "station_scores", "tempco"):
         columns[name] = [_packed(name, run) for run in runs]
     buffer = io.BytesIO()
-    arrays = {f"{name}/{key}": v for name, of in products.items() for key, v in of.items()}
+    arrays = {f"{name}/{key}": v for name, parts in products.items() for key, v in parts.items()}
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
     named = {name: [group[0].columns, group[0].of_station, len(group)] for name, group in groups.items()}
     about = {"version": VERSION, "columns": named}
@@ -273,7 +273,7 @@ def _content(data: bytes) -> _Content | None:
 
 
 def _names(about: dict[str, Any]) -> dict[str, Any]:
-    return {name: (_pairs(of[0]), _pairs(of[1]), int(of[2])) for name, of in about["columns"].items()}
+    return {name: (_pairs(entry[0]), _pairs(entry[1]), int(entry[2])) for name, entry in about["columns"].items()}
 
 
 def _pairs(listed: Sequence[Sequence[Any]]) -> tuple[tuple[str, int], ...]:

@@ -98,7 +98,7 @@ def _scored(run: Run) -> ScoredRun:
             return ScoredRun(**head, left_out="its devices have fewer than three axes")
         faulty = {fault.unit for fault in faults}
         units = tuple(unit for row, unit in enumerate(measurement.units) if row not in faulty)
-        return _kept(head, units, slots, scores_of(lot, effects))
+        return _scored_lot(head, units, slots, scores_of(lot, effects))
     except (InertialError, DataRejected, RecipeInvalid) as problem:
         return ScoredRun(**head, left_out=str(problem).rstrip("."))
 
@@ -116,7 +116,7 @@ def _reason(run: Run, effects: Sequence[str]) -> str:
     return ""
 
 
-def _kept(head: dict[str, Any], units: tuple[str, ...], slots: dict[str, str], scores: LotScores) -> ScoredRun:
+def _scored_lot(head: dict[str, Any], units: tuple[str, ...], slots: dict[str, str], scores: LotScores) -> ScoredRun:
     count = len(units)
     return ScoredRun(
         **head,

@@ -91,8 +91,8 @@ def _pinned() -> Check:
         if name in held and held[name] != version
     ]
     if not other:
-        same = len(locked.keys() & held.keys())
-        return Check(PART, "lock", "good", f"{same} libraries have the versions of the lock")
+        matching = len(locked.keys() & held.keys())
+        return Check(PART, "lock", "good", f"{matching} libraries have the versions of the lock")
     more = f" and {len(other) - SHOWN} more" if len(other) > SHOWN else ""
     found, needed = f"{'; '.join(other[:SHOWN])}{more}", "the versions of the lock, which were tested together"
     return Check(PART, "lock", "warning", found, needed, f"run: pip install --no-deps --require-hashes -r {path}")

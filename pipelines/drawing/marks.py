@@ -34,7 +34,7 @@ class PlotArea:
         return self.top + self.height * (1.0 - np.clip(self.along(values), 0.0, 1.0))
 
     def holds(self, x: Array, y: Array) -> Flags:
-        """Which points lie inside."""
+        """Mask of the points inside the rectangle."""
         across, along = self.across(x), self.along(y)
         return (
             np.isfinite(across + along) & (np.abs(across - 0.5) <= 0.5 + INSIDE) & (np.abs(along - 0.5) <= 0.5 + INSIDE)
@@ -53,17 +53,17 @@ def shade(values: Array, scale: ColourScale) -> list[str]:
 
 
 def _points(trace: Trace, area: PlotArea, scale: ColourScale | None) -> str:
-    there = area.holds(trace.x, trace.y)
-    x, y = area.x(trace.x[there]), area.y(trace.y[there])
+    inside = area.holds(trace.x, trace.y)
+    x, y = area.x(trace.x[inside]), area.y(trace.y[inside])
     role = ROLES[trace.role]
     parts: list[str] = []
     if trace.error is not None:
-        low, high = (area.y((trace.y + sign * trace.error)[there]) for sign in (-1.0, 1.0))
+        low, high = (area.y((trace.y + sign * trace.error)[inside]) for sign in (-1.0, 1.0))
         bars = "".join(f"M{a:.1f} {b:.1f}V{c:.1f}" for a, b, c in zip(x, low, high, strict=True))
         parts.append(f'<path d="{bars}" stroke="{role}"/>')
     if trace.colour is None or scale is None:
         return "".join(parts) + marks(x, y, trace, role)
-    colours = np.array(shade(trace.colour[there], scale))
+    colours = np.array(shade(trace.colour[inside], scale))
     parts.append(marks(x, y, trace, OUTLINE, 1.0))
     for colour in dict.fromkeys(colours.tolist()):
         of_colour = colours == colour
@@ -94,32 +94,32 @@ def _line(trace: Trace, area: PlotArea, scale: ColourScale | None) -> str:
     x, y = area.x(trace.x), area.y(trace.y)
     drawn = np.isfinite(x + y) & (np.abs(area.across(trace.x) - 0.5) <= 0.5 + INSIDE) & ~_far_outside(area, trace.y)
     path, pen = "", "M"
-    for a, b, there in zip(x, y, drawn, strict=True):
-        path += f"{pen}{a:.1f} {b:.1f}" if there else ""
-        pen = "L" if there else "M"
+    for a, b, visible in zip(x, y, drawn, strict=True):
+        path += f"{pen}{a:.1f} {b:.1f}" if visible else ""
+        pen = "L" if visible else "M"
     dash = ' stroke-dasharray="6 4"' if trace.dashed else ""
     width = trace.width or (1.6 if trace.name else 0.8)
     return f'<path d="{path}" stroke="{ROLES[trace.role]}" stroke-width="{width:g}" fill="none"{dash}/>' if path else ""
 
 
 def _far_outside(area: PlotArea, y: Array) -> Flags:
-    """Which points of a line are above or below the rectangle with their neighbours: the line does not follow its edge."""
+    """Mask of the points above or below the rectangle with their neighbours: the line does not follow its edge."""
     outside = np.abs(area.along(y) - 0.5) > 0.5 + INSIDE
     return outside & np.append(outside[1:], True) & np.append(True, outside[:-1])
 
 
 def _band(trace: Trace, area: PlotArea, scale: ColourScale | None) -> str:
     high = np.asarray(trace.high)
-    there = np.isfinite(trace.x + trace.y + high)
-    x = area.x(trace.x[there])
-    edge = [*zip(x, area.y(trace.y[there]), strict=True), *zip(x[::-1], area.y(high[there])[::-1], strict=True)]
+    finite = np.isfinite(trace.x + trace.y + high)
+    x = area.x(trace.x[finite])
+    edge = [*zip(x, area.y(trace.y[finite]), strict=True), *zip(x[::-1], area.y(high[finite])[::-1], strict=True)]
     path = "L".join(f"{a:.1f} {b:.1f}" for a, b in edge)
     return f'<path d="M{path}z" fill="{ROLES[trace.role]}" fill-opacity=".18"/>' if edge else ""
 
 
 def _bars(trace: Trace, area: PlotArea, scale: ColourScale | None) -> str:
-    there = np.isfinite(trace.x + trace.y)
-    at, value = trace.x[there], trace.y[there]
+    finite = np.isfinite(trace.x + trace.y)
+    at, value = trace.x[finite], trace.y[finite]
     apart = float(np.min(np.diff(np.sort(at)))) if at.size > 1 else 1.0
     left, right = (area.x(at + sign * 0.5 * BAR_SHARE * apart) for sign in (-1.0, 1.0))
     base, top = area.y(np.zeros_like(value)), area.y(value)

@@ -149,8 +149,8 @@ def _axis(axis: PlotAxis, plot: Plot, side: str, most_names: int) -> dict[str, A
         if days.size and np.ptp(days) < NARROW_D:
             out["range"] = [DAY_MS * (float(days.min()) - NARROW_D), DAY_MS * (float(days.max()) + NARROW_D)]
     if axis.names:
-        every = -(-len(axis.names) // most_names) if side == "x" else 1
-        places = list(range(0, len(axis.names), every))
+        step = -(-len(axis.names) // most_names) if side == "x" else 1
+        places = list(range(0, len(axis.names), step))
         out |= {"tickvals": places, "ticktext": [_safe(shortened(axis.names[k])) for k in places]}
     if axis.step is not None:
         out["dtick"] = axis.step
@@ -178,10 +178,10 @@ def _trace(trace: Trace, names: tuple[str, str], shown: set[str], *, dates: bool
         }  # fmt: skip
     if trace.style == "band":
         # one closed line: up along the low edge, back along the high one
-        back = np.asarray(trace.high)[::-1]
+        upper = np.asarray(trace.high)[::-1]
         return out | {
             "type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": f"{colour}:0.2", "line": {"width": 0},
-            "x": packed(np.concatenate([x, x[::-1]])), "y": packed(np.concatenate([trace.y, back])), "hoverinfo": "skip",
+            "x": packed(np.concatenate([x, x[::-1]])), "y": packed(np.concatenate([trace.y, upper])), "hoverinfo": "skip",
         }  # fmt: skip
     out |= {"x": packed(x, dates=dates), "y": packed(trace.y)}
     if trace.style == "bars":

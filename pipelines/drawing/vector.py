@@ -50,14 +50,14 @@ def svg_text(chart: Chart) -> str:
     lines = _legend_lines(names)
     head = max(HEAD, LINE * len(lines) + 6.0)
     wide = WIDTH - (BAR if chart.scale is not None else 0.0)
-    each = (wide - GAP * (chart.columns - 1)) / chart.columns
-    scaled = [_scaled(plot, each, float(chart.height)) for plot in chart.plots]
+    plot_width = (wide - GAP * (chart.columns - 1)) / chart.columns
+    scaled = [_scaled(plot, plot_width, float(chart.height)) for plot in chart.plots]
     left = [
         max((_left(chart, k, scaled[k][1]) for k in range(column, len(chart.plots), chart.columns)), default=0.0)
         for column in range(chart.columns)
     ]
     feet = [
-        0.0 if plot.sphere else _foot(scaled[k][0].ticks, each - left[k % chart.columns] - 6.0)
+        0.0 if plot.sphere else _foot(scaled[k][0].ticks, plot_width - left[k % chart.columns] - 6.0)
         for k, plot in enumerate(chart.plots)
     ]
     tall = chart.height + max(feet, default=0.0)
@@ -68,11 +68,11 @@ def svg_text(chart: Chart) -> str:
     ]
     for number, plot in enumerate(chart.plots):
         row, column = divmod(number, chart.columns)
-        x, y = column * (each + GAP), head + row * tall
+        x, y = column * (plot_width + GAP), head + row * tall
         if plot.sphere:
-            area = _sphere_area(plot, x, y, each, tall)
+            area = _sphere_area(plot, x, y, plot_width, tall)
         else:
-            wide_each, tall_each = each - left[column] - 6.0, tall - TOP - BOTTOM - feet[number]
+            wide_each, tall_each = plot_width - left[column] - 6.0, tall - TOP - BOTTOM - feet[number]
             area = PlotArea(x + left[column], y + TOP, wide_each, tall_each, *(axis.at for axis in scaled[number]))
             parts.append(_axes(plot, area, scaled[number], feet[number], labelled=_labelled(chart, number)))
         parts += [DRAW[trace.style](trace, area, chart.scale) for trace in plot.traces]
@@ -121,8 +121,8 @@ def _axis(axis: PlotAxis, arrays: list[Array], most: int) -> _Scaled:
     if axis.low is not None and axis.high is not None:
         low, high = (float(np.log10(axis.low)), float(np.log10(axis.high))) if axis.log else (axis.low, axis.high)
     if axis.names:
-        every = 1 + len(axis.names) // max(MOST_NAMES, 3 * most)
-        ticks = [(float(k), axis.names[k]) for k in range(0, len(axis.names), every) if low <= k <= high]
+        step = 1 + len(axis.names) // max(MOST_NAMES, 3 * most)
+        ticks = [(float(k), axis.names[k]) for k in range(0, len(axis.names), step) if low <= k <= high]
     elif axis.log:
         ticks = log_ticks(10.0**low, 10.0**high)
     elif axis.dates:
@@ -237,9 +237,9 @@ def _bar(scale: ColourScale, x: float, y: float, height: float) -> str:
     steps = 48
     share = (np.arange(steps) + 0.5) / steps
     colours = shade(scale.low + share * (scale.high - scale.low), scale)
-    each = height / steps
+    step_height = height / steps
     cells = "".join(
-        f'<path d="M{x:.1f} {y + height - each * (k + 1):.2f}h12v{each + 0.4:.2f}h-12z" fill="{colour}"/>'
+        f'<path d="M{x:.1f} {y + height - step_height * (k + 1):.2f}h12v{step_height + 0.4:.2f}h-12z" fill="{colour}"/>'
         for k, colour in enumerate(colours)
     )
     labels = "".join(

@@ -65,11 +65,11 @@ def compare(root: Any, facts: CertificateFacts, archive: Archive, who: Laborator
     except TumblelineError as problem:
         return Compared(True, *_ended(calibration), _other_entry(facts, calibration), reason=str(problem))
     # comments and instructions before the root element count as well
-    here, there = root.getroottree(), [parsed(dcc(content)).getroottree() for content in made]
-    if any(canonical(here) == canonical(document) for document in there):
+    found, expected = root.getroottree(), [parsed(dcc(content)).getroottree() for content in made]
+    if any(canonical(found) == canonical(document) for document in expected):
         unproven = "" if who is not None else said_by(made[0].who)
         return Compared(True, *_ended(calibration), count=len(list(_nodes(root))), unproven=unproven)
-    return Compared(True, *_ended(calibration), tuple(_different(root, there[0].getroot())))
+    return Compared(True, *_ended(calibration), tuple(_different(root, expected[0].getroot())))
 
 
 def _made_again(
@@ -101,9 +101,9 @@ def _other_entry(facts: CertificateFacts, calibration: Calibration) -> tuple[str
     )
 
 
-def _different(here: Any, there: Any) -> list[str]:
+def _different(found: Any, expected: Any) -> list[str]:
     """The first differences of two documents, and the number of the others."""
-    pairs = [(a, b) for a, b in zip_longest(_nodes(here), _nodes(there)) if (a or NONE)[:2] != (b or NONE)[:2]]
+    pairs = [(a, b) for a, b in zip_longest(_nodes(found), _nodes(expected)) if (a or NONE)[:2] != (b or NONE)[:2]]
     if not pairs:
         return ["the file differs from the document of the archive in what stands around its root element"]
     pairs = [pair for pair in pairs if SPACE not in {item[0] for item in pair if item}] or pairs
@@ -111,20 +111,20 @@ def _different(here: Any, there: Any) -> list[str]:
     return [*lines, f"and {len(pairs) - SHOWN} other places"] if len(pairs) > SHOWN else lines
 
 
-def _line(here: tuple[str, str, str], there: tuple[str, str, str]) -> str:
-    if here[0] == there[0]:
-        equal = takewhile(lambda pair: pair[0] == pair[1], zip(here[1], there[1], strict=False))
-        same = len(list(equal)) if len(here[1]) > LONGEST else 0
-        return f"{there[2]}: the file says {_short(here[1], same)}, the archive {_short(there[1], same)}"
+def _line(found: tuple[str, str, str], expected: tuple[str, str, str]) -> str:
+    if found[0] == expected[0]:
+        equal = takewhile(lambda pair: pair[0] == pair[1], zip(found[1], expected[1], strict=False))
+        common = len(list(equal)) if len(found[1]) > LONGEST else 0
+        return f"{expected[2]}: the file says {_short(found[1], common)}, the archive {_short(expected[1], common)}"
     return (
-        f"{here[2] or 'end of the document'}: the file says {_short(here[1])}, the archive has "
-        f"{there[2] or 'nothing'} {_short(there[1])} in its place"
+        f"{found[2] or 'end of the document'}: the file says {_short(found[1])}, the archive has "
+        f"{expected[2] or 'nothing'} {_short(expected[1])} in its place"
     )
 
 
-def _short(text: str, same: int = 0) -> str:
+def _short(text: str, common: int = 0) -> str:
     """A text from shortly before its first difference on."""
-    excerpt = " ".join(f"{'…' if same > 20 else ''}{text[max(0, same - 20) :]}".split())
+    excerpt = " ".join(f"{'…' if common > 20 else ''}{text[max(0, common - 20) :]}".split())
     return f"'{excerpt[:LONGEST]}{'…' if len(excerpt) > LONGEST else ''}'" if excerpt else "nothing"
 
 
@@ -189,7 +189,7 @@ STATED = {
         "condition": f"{ITEM}/dcc:description/dcc:content",
     },
 }
-"""Where the administrative data of a document have the keys of the laboratory's file."""
+"""Paths in the administrative data of a document, by the keys of the laboratory's file."""
 ACCREDITED, DEVIATIONS = "Accreditation: ", "Deviations from the method: "
 
 NOBODY = LaboratoryFile.model_validate(

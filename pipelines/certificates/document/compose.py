@@ -243,8 +243,8 @@ def _amendment(calibration: Calibration, known: list[Calibration]) -> content.Am
     """The certificates of the run that a certificate replaces, with the reason, and the certificate that replaces it."""
     earlier = [old for old in known if old.run == calibration.run and old.event.sequence < calibration.event.sequence]
     ended = [old.certificate for old in earlier if old.event.sequence in calibration.event.ends]
-    alike = [old for old in earlier if calibration.event.ends_others_of(old.event)][-1:]
-    ended = ended or [old.certificate for old in alike if old.withdrawn and calibration.event.reason]
+    same_kind = [old for old in earlier if calibration.event.ends_others_of(old.event)][-1:]
+    ended = ended or [old.certificate for old in same_kind if old.withdrawn and calibration.event.reason]
     last = calibration.ended_by
     after = last.certificate if last is not None and last.action != "revoke" else ""
     return content.Amendment(replaces=tuple(ended), reason=calibration.event.reason if ended else "", replaced_by=after)

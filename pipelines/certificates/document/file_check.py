@@ -155,11 +155,11 @@ def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
             done.add("signature", "not checked", "the PDF is not signed: nothing shows that its pages are unchanged")
     beside = done.path.with_suffix(".xml")
     if beside.is_file():
-        same = _read(beside) == attached[0]
+        matches = _read(beside) == attached[0]
         done.add(
             "attachment",
-            "good" if same else "bad",
-            f"the attached XML is {beside.name}" if same else f"the attached XML differs from {beside.name}",
+            "good" if matches else "bad",
+            f"the attached XML is {beside.name}" if matches else f"the attached XML differs from {beside.name}",
         )
     return root
 

@@ -144,8 +144,8 @@ def _of_unit(serial: str, known: list[Calibration], number: str) -> Calibration:
     if number:
         meant = [calibration for calibration in known if str(calibration.event.sequence) == number]
         if not meant:
-            there = ", ".join(calibration.certificate for calibration in known)
-            raise WrongUse(f"certificate: {serial}/{number} is not in the ledger, there are {there}; give one of them")
+            listed = ", ".join(calibration.certificate for calibration in known)
+            raise WrongUse(f"certificate: {serial}/{number} is not in the ledger, there are {listed}; give one of them")
         return meant[0]
     return next((calibration for calibration in reversed(known) if calibration.state == "valid"), known[-1])
 

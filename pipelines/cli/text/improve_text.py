@@ -182,8 +182,8 @@ def _missing(document: dict[str, Any]) -> None:
     """Print missing effects, added effects, and the errors on dwells that were left out."""
     for choice in document["choices"]:
         others = ", ".join(choice["not_separated_from"])
-        alike = f" (these data do not separate it from {others})" if others else ""
-        say(f"  missing: {choice['effect']}{alike}; {'added' if choice['added'] else 'not added'}", style="yellow")
+        class_note = f" (these data do not separate it from {others})" if others else ""
+        say(f"  missing: {choice['effect']}{class_note}; {'added' if choice['added'] else 'not added'}", style="yellow")
     for fault in document["diagnosis"]["blocked_by"]:
         dwells = ", ".join(map(str, fault["dwells"])) or "all"
         say(f"  data fault {fault['fault']}, dwells {dwells}: {fault['evidence']}", style="bold red")

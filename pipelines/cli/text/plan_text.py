@@ -43,9 +43,9 @@ def print_plan(document: dict[str, Any]) -> None:
     print_table(
         ["visible effect", "v", "1/v²", "floor, µg", "floor of the coefficient"], [_visible_line(row) for row in seen]
     )
-    alike = [[row["effect"], _aliases(row)] for row in seen if row["alias"]]
-    if alike:
-        print_table(["visible effect", "confounded with"], alike)
+    aliased = [[row["effect"], _aliases(row)] for row in seen if row["alias"]]
+    if aliased:
+        print_table(["visible effect", "confounded with"], aliased)
     faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
         say(f"* seen only where larger than usual: {', '.join(faint)}")
