@@ -104,10 +104,8 @@ class Archive:
 
     def first_run_of(self, capture_id: str, units: Sequence[str]) -> Run | None:
         """The run that measured a capture; None where no run of these units is of it. Later ones analyse the same data again."""
-        candidates = (info.id for info in self.runs() if not info.rerun_of and info.units == tuple(units))
-        return next(
-            (run for run_id in candidates if (run := Run(self, run_id)).about.get("capture") == capture_id), None
-        )
+        ids = (info.id for info in self.runs() if not info.rerun_of and info.units == tuple(units))
+        return next((run for run_id in ids if (run := Run(self, run_id)).about.get("capture") == capture_id), None)
 
     def capture(self, capture_id: str) -> Records:
         """The records of a capture, for reading or for continuing."""

@@ -69,16 +69,11 @@ class Certificates:
 
     def _deciding(self, known: Sequence[Calibration]) -> tuple[Calibration | None, Calibration]:
         """The calibration that is due first: of a subject without a valid one the last, else the valid one that ends first."""
-        named = dict.fromkeys(subject for calibration in known for subject in calibration.event.covers.split())
-        subjects = (
-            [calibration for calibration in known if subject in calibration.event.covers.split()] for subject in named
-        )
+        subjects = dict.fromkeys(subject for entry in known for subject in entry.event.covers.split())
+        groups = ([entry for entry in known if subject in entry.event.covers.split()] for subject in subjects)
         pairs = [
-            (
-                held := next((calibration for calibration in of_subject if calibration.holds(self.day)), None),
-                held or of_subject[-1],
-            )
-            for of_subject in subjects
+            (held := next((entry for entry in group if entry.holds(self.day)), None), held or group[-1])
+            for group in groups
         ]
         return next((pair for pair in pairs if pair[0] is None), min(pairs, key=lambda pair: pair[1].until))
 

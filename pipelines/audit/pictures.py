@@ -138,12 +138,8 @@ def evidence_chart(audit: Audit, finding: AuditFinding) -> Chart | None:
     parameter = str(numbers.get("parameter", ""))
     if finding.who == "station" and "where" in numbers:
         key = (str(numbers["station"]), str(numbers["where"]), parameter)
-        series = (
-            candidate
-            for candidate in (*audit.stations, *audit.slots)
-            if (candidate.station, candidate.where, candidate.parameter) == key
-        )
-        return next((series_chart(candidate) for candidate in series), None)
+        series = (s for s in (*audit.stations, *audit.slots) if (s.station, s.where, s.parameter) == key)
+        return next((series_chart(s) for s in series), None)
     if "standard" in numbers:
         key = (str(numbers["station"]), str(numbers["standard"]), parameter)
         charts = (chart for chart in audit.charts if (chart.station, chart.standard, chart.parameter) == key)
@@ -151,10 +147,7 @@ def evidence_chart(audit: Audit, finding: AuditFinding) -> Chart | None:
     if not finding.units or len(finding.units) > len(UNIT_ROLES) or "run" not in numbers:
         return None
     drifts = [
-        d
-        for of_unit in audit.units.values()
-        for d in of_unit
-        if d.unit == finding.units[0] and d.parameter == parameter
+        d for unit in audit.units.values() for d in unit if (d.unit, d.parameter) == (finding.units[0], parameter)
     ]
     if drifts:
         return drift_chart(audit, drifts[0])

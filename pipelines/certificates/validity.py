@@ -142,12 +142,8 @@ def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersed
     Earlier calibrations end where the new one begins. Later ones are ended only with ``supersede``, because otherwise a
     calibration that is written afterwards would silently replace a newer one.
     """
-    clash = [
-        calibration
-        for calibration in known
-        if calibration.start < calibration.until and calibration.start < until and start < calibration.until
-    ]
-    later = [calibration for calibration in clash if calibration.start > start]
+    clash = [old for old in known if old.start < old.until and old.start < until and start < old.until]
+    later = [old for old in clash if old.start > start]
     if later and not supersede:
         first = later[0]
         raise WrongUse(
@@ -155,4 +151,4 @@ def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersed
             f"valid from {first.start} to {first.until}, and begins before it; choose other dates, or end that calibration "
             "with --supersede"
         )
-    return tuple(calibration.event.sequence for calibration in clash)
+    return tuple(old.event.sequence for old in clash)

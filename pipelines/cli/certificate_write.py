@@ -43,12 +43,9 @@ def write(
     file, _, password = sign_with.partition(",")
     key = read_key(Path(file), Path(password) if password else None) if sign_with else None
     done = issue(Archive(archive), names, who, output, key=key, address=address)
-    lines = [f"certificate {certificate.number}: {certificate.pdf}, {certificate.xml}" for certificate in done.written]
+    lines = [f"certificate {entry.number}: {entry.pdf}, {entry.xml}" for entry in done.written]
     fields = ("serial", "run", "pdf", "xml", "signature")
-    written = [
-        {"certificate": certificate.number, **{key: getattr(certificate, key) for key in fields}}
-        for certificate in done.written
-    ]
+    written = [{"certificate": entry.number, **{key: getattr(entry, key) for key in fields}} for entry in done.written]
     give({"certificates": written, "left_out": done.left_out}, lines, as_json=as_json)
     for serial, why in done.left_out.items():
         remark(f"certificate: {serial}: {why}")

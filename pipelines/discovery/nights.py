@@ -243,7 +243,7 @@ def remembered(
     for row in (row for row in rows if not row["id"]):
         row["id"] = f"D{stored['ids'] + len(document['new']) + 1}"
         document["new"].append(row["id"])
-    content = {
+    found = {
         "version": _VERSION,
         "discoveries": document["discoveries"],
         "unexplained": document["unexplained"],
@@ -254,10 +254,8 @@ def remembered(
     }
     if not keep:
         return document
-    if stored.get("alarms") != content["alarms"] or content["lots"] > _GROWN * stored["lots"]:
-        files.publish(
-            source.folder() / "found", derived.framed(json.dumps(json_value(content), sort_keys=True).encode())
-        )
+    if stored.get("alarms") != found["alarms"] or found["lots"] > _GROWN * stored["lots"]:
+        files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(found), sort_keys=True).encode()))
     return document
 
 

@@ -31,11 +31,7 @@ def _python() -> Check:
     if version not in SpecifierSet(needed, prereleases=True):
         return Check(PART, "Python", "fault", version, needed, "install the product in an environment of that version")
     classes = metadata.metadata(PRODUCT).get_all("Classifier") or ()  # the versions that the tests have run on
-    tested = [
-        classifier.rpartition(" :: ")[2]
-        for classifier in classes
-        if classifier.startswith("Programming Language :: Python :: 3.")
-    ]
+    tested = [name.rpartition(" :: ")[2] for name in classes if name.startswith("Programming Language :: Python :: 3.")]
     if version.rpartition(".")[0] not in tested:
         remedy = "install the product in an environment of one of these where it is validated"
         needed = f"{', '.join(tested)}, which the tests run on"

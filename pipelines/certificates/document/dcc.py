@@ -301,11 +301,8 @@ def _reference(w: _Writer, parent: Any, reference: Any) -> None:
     w.text(box, "name", reference.what or reference.id)
     w.text(box, "description", f"due {reference.due}; {reference.uncertainty or 'uncertainty not stated'}")
     certificate = w.add(box, "certificate")
-    w.text(
-        certificate,
-        "referral",
-        f"{reference.laboratory or 'laboratory not stated'}, {reference.date or 'date not stated'}",
-    )
+    laboratory = reference.laboratory or "laboratory not stated"
+    w.text(certificate, "referral", f"{laboratory}, {reference.date or 'date not stated'}")
     w.add(certificate, "referralID", reference.certificate)
     w.add(certificate, "procedure", "SHA-256" if reference.sha256 else "none: no hash is stated")
     w.add(certificate, "value", reference.sha256)

@@ -105,20 +105,13 @@ def issue(
             parts["pdf"] = sign_pdf(document, key)
             parts["xml.sig"] = sign_xml(xml, key)
         made.append((calibration, parts))
-    for calibration, parts in made:
-        stem = calibration.certificate.replace("/", "_")
+    for entry, parts in made:
+        stem = entry.certificate.replace("/", "_")
         paths = {end: folder / f"{stem}.{end}" for end in parts}
         for end, data in parts.items():
             files.publish(paths[end], data, WHERE, "give another folder with --output")
         done.written.append(
-            Written(
-                calibration.certificate,
-                calibration.serial,
-                calibration.run,
-                paths["pdf"],
-                paths["xml"],
-                paths.get("xml.sig"),
-            )
+            Written(entry.certificate, entry.serial, entry.run, paths["pdf"], paths["xml"], paths.get("xml.sig"))
         )
     return done
 

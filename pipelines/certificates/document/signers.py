@@ -90,11 +90,9 @@ def _path_problem(signer: Signer, trusted: Sequence[Certificate], moment: dateti
     def loaded(certificate: Certificate) -> object:
         return asn1.Certificate.load(certificate.public_bytes(Encoding.DER))
 
+    roots = [loaded(anchor) for anchor in trusted]
     context = certvalidator.ValidationContext(
-        trust_roots=[loaded(anchor) for anchor in trusted],
-        moment=moment,
-        best_signature_time=moment,
-        allow_fetching=False,
+        trust_roots=roots, moment=moment, best_signature_time=moment, allow_fetching=False
     )
     validator = certvalidator.CertificateValidator(
         loaded(signer.certificate), [loaded(certificate) for certificate in signer.chain], validation_context=context
