@@ -68,8 +68,8 @@ def control_chart(chart: ControlChart) -> Chart:
     traces.append(Trace("moving average", chart.day, chart.average, "line", "before"))
     texts = np.array([f"{run}: {value:.5g}" for run, value in zip(chart.run, chart.value, strict=True)], dtype=object)
     for rows, (name, role, symbol, size) in zip((~chart.hit, chart.hit), SIGNALS, strict=True):
-        told = tuple(texts[rows])
-        traces.append(Trace(name, chart.day[rows], chart.value[rows], "points", role, symbol, size, texts=told))
+        labels = tuple(texts[rows])
+        traces.append(Trace(name, chart.day[rows], chart.value[rows], "points", role, symbol, size, texts=labels))
     alarms = f"{number_of(chart.alarms, 'alarm')}, {chart.expected:.1f} expected by chance"
     name = parameter_text(chart.parameter)
     title = f"{chart.station}: {chart.standard}, {name}: {alarms}"

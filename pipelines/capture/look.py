@@ -14,7 +14,7 @@ class Look:
     """The evaluation of the records so far.
 
     known : whether every unit is decided; text : why, or what is missing
-    fails : units that have not been told before, with the figure that they fail; given_up : effects that the end leaves unseen
+    fails : units not reported before, with the figure that they fail; given_up : effects that the end leaves unseen
     dwell_s : length of the dwells from here on; None where it stays
     """
 
@@ -32,8 +32,8 @@ class Looks(Protocol):
         """Whether the records so far are evaluated after this record."""
         ...
 
-    def look(self, record: int, told: frozenset[str]) -> Look:
-        """The evaluation of the records up to this record; ``told``: units whose failure is known already."""
+    def look(self, record: int, reported: frozenset[str]) -> Look:
+        """The evaluation of the records up to this record; ``reported``: units whose failure is known already."""
         ...
 
 

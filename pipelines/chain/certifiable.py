@@ -153,13 +153,13 @@ def refuse_contradicted(run: Run) -> str:
     Refused where chance does not explain it: a U from the stated references would be smaller than the run has shown.
     """
     judged = references_of(run)
-    told = "" if judged is None else contradiction(judged)
-    if judged is not None and told and not passes(judged["p_value"] or 0.0, REFUTED_BELOW):
+    text = "" if judged is None else contradiction(judged)
+    if judged is not None and text and not passes(judged["p_value"] or 0.0, REFUTED_BELOW):
         raise WrongUse(
-            f"certify: run {run.id}: {told}; a U from the stated values would be too small, references that hold are needed; "
+            f"certify: run {run.id}: {text}; a U from the stated values would be too small, references that hold are needed; "
             "have the table examined, state in [uncertainty] at least what was found, and measure again"
         )
-    return told
+    return text
 
 
 def refuse_unstated(run: Run) -> None:

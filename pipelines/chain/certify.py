@@ -128,8 +128,8 @@ def _proposals(
     refuse_unstated(run)
     static = not run.table("coefficients").empty
     comparisons = Comparisons(run)
-    if told := refuse_contradicted(run):
-        adequacy += f"{'; ' if adequacy else ''}{told}"
+    if contradicted := refuse_contradicted(run):
+        adequacy += f"{'; ' if adequacy else ''}{contradicted}"
     about, result = run.about, Certified()
     named = (*EVIDENCE, *(TABLES if comparisons.parts else ()))
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in named))

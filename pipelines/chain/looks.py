@@ -67,15 +67,15 @@ class LotLooks:
         """Whether the records so far are evaluated after this record."""
         return record in self._due
 
-    def look(self, record: int, told: frozenset[str]) -> Look:
+    def look(self, record: int, reported: frozenset[str]) -> Look:
         """The evaluation of the records up to this record."""
         with threadpool_limits(1):
             try:
-                return self._look(record, told)
+                return self._look(record, reported)
             except (TumblelineError, InertialError) as problem:
                 return Look(known=False, text=f"cannot be judged yet: {problem}")
 
-    def _look(self, record: int, told: frozenset[str]) -> Look:
+    def _look(self, record: int, reported: frozenset[str]) -> Look:
         state = _Evaluated(self.job, self._readings(), self._summary(), self.records.gathered("history"))
         if not state.units:
             return Look(known=False, text="no unit is fitted")
@@ -102,7 +102,7 @@ class LotLooks:
         not_fitted = f", {lost} not fitted" if lost else ""
         decided = f"{len(fitted) - len(undecided)} of {len(fitted)} units decided{not_fitted}"
         text = f"{asked}{decided}{_most_often(figures, undecided)}"
-        new = {unit: sentence for unit, sentence in fails.items() if unit not in told}
+        new = {unit: sentence for unit, sentence in fails.items() if unit not in reported}
         missing = "" if undecided else self._missing(record, state)
         if undecided or missing:
             return Look(

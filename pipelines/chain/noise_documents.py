@@ -60,7 +60,7 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
     terms = without_digits(limits_where_unexplained(curve, fitted), coarse, series.rate_hz)
     explained = fitted.p_value >= UNEXPLAINED_P
     names = [series.names[k] for k in alive]
-    told = [disturbance_texts(found, series.rate_hz, series.unit) for found in disturbed]
+    found_texts = [disturbance_texts(found, series.rate_hz, series.unit) for found in disturbed]
     notes = [series.recognised] if series.recognised else []
     notes += [f"{series.names[k]}: the output never changes" for k in range(len(series.names)) if k not in alive]
     notes += [
@@ -71,7 +71,7 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
     notes += [
         f"{name}: {', '.join(texts) if texts else 'no mixture of the five terms explains the curve'}"
         f"{'' if known else '; the limits are what the whole curve allows'}"
-        for name, known, texts in zip(names, explained, told, strict=True)
+        for name, known, texts in zip(names, explained, found_texts, strict=True)
         if texts or not known
     ]
     shown, unit, about, model = curve, series.unit, ALLAN, model_deviation(terms, curve.tau)

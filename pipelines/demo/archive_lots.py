@@ -78,13 +78,13 @@ class Line:
             self._unit(serial, str(wafer), force, time, chamber + 0.05 * rng.standard_normal())
             for serial, wafer in zip(serials, about["wafer"], strict=True)
         ]
-        told = _force(angles)
+        stated = _force(angles)
         common = {
             "dwell": np.arange(len(soak)),
             "time_s": time,
             "outer_deg": angles[:, 0],
             "inner_deg": angles[:, 1],
-            **{f"force_{a}": told[:, k] for k, a in enumerate("xyz")},
+            **{f"force_{a}": stated[:, k] for k, a in enumerate("xyz")},
             "chamber_C": chamber,
         }
         tables = [

@@ -235,14 +235,14 @@ def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
             f"confirmed on stretches of time left out (log likelihood +{gain:.1f}), and the run shows no fault; {fall}"
         )
     why = progress.get("reason") or "no judgement is possible"
-    told = why if fall in why else f"{why}; {fall}"
+    text = why if fall in why else f"{why}; {fall}"
     decides = "a fresh run of the same units decides"
     if gain is not None and gain > LEFT_OUT:
         return (
             f"not decided by this run alone: stretches of time left out confirm it (log likelihood "
-            f"+{gain:.1f}), but {told}; {decides}"
+            f"+{gain:.1f}), but {text}; {decides}"
         )
-    return f"not decided by dwells left out: {told}; {decides}"
+    return f"not decided by dwells left out: {text}; {decides}"
 
 
 def _told_by_fresh(progress: dict[str, Any], fall: str) -> str:

@@ -164,8 +164,8 @@ def _by_face(dwells: pd.DataFrame, mapping: Mapping) -> tuple[Array, Array, Arra
 def _line(k: int, bias: tuple[float, float, float], plain: Faces, unit: str) -> str:
     """An output as text; ``bias``: its value, its standard error, and the bias of the published method."""
     value, error, published = bias
-    told = f"{AXES[k]}: bias {value:.7g} ± {COVERAGE * error:.2g} {unit} (k = {COVERAGE:g}; published method {published:.7g})"
+    text = f"{AXES[k]}: bias {value:.7g} ± {COVERAGE * error:.2g} {unit} (k = {COVERAGE:g}; published method {published:.7g})"
     misfit = f"lack of fit {plain.rms[k]:.3g}"
     if not np.isfinite(plain.p_value[k]):
-        return f"{told}; {misfit} {unit}"
-    return f"{told}; {misfit}, the samples allow {plain.pure_error[k]:.2g} {unit} (p {equal(plain.p_value[k])})"
+        return f"{text}; {misfit} {unit}"
+    return f"{text}; {misfit}, the samples allow {plain.pure_error[k]:.2g} {unit} (p {equal(plain.p_value[k])})"

@@ -74,8 +74,8 @@ def fitted(
         smaller = _smaller(dwells, history, effects, gravity)
     verdict = diagnose(fitted_dwells(dwells), history, list(effects))
     lines = tuple(_lines(done, smaller, verdict, out_unit))
-    told = told_by(verdict, dwells["unit"].nunique())
-    return NormAnswer(done, _document(done, smaller, verdict), lines, told)
+    adequacy = told_by(verdict, dwells["unit"].nunique())
+    return NormAnswer(done, _document(done, smaller, verdict), lines, adequacy)
 
 
 def _smaller(

@@ -30,9 +30,9 @@ def verdict(document: dict[str, Any]) -> str:
         )
     judged = {"adequate": document["adequate"], "reason": document.get("reason"), **error}
     judged["units"] = len(document["units"]) - len(faulty)
-    told, figures = plain_verdict(judged), _figures(judged)
+    text, figures = plain_verdict(judged), _figures(judged)
     if document["adequate"] is not False:
-        return f"{told}."
+        return f"{text}."
     spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
     single = document.get("leave_out") or {}
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
@@ -44,13 +44,13 @@ def verdict(document: dict[str, Any]) -> str:
         without = f"the model {'cannot be judged' if passes and unknown else found}: {figures}"
         return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
     if named:
-        return f"{told}; missing: {', and '.join(named)}."
+        return f"{text}; missing: {', and '.join(named)}."
     rest = document.get("reason") or (
         "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
     )
     if document["unexplained"]:
         rest = f"{document['unexplained']['text']}, and no effect of the catalogue explains it"
-    return f"{told}; {rest}."
+    return f"{text}; {rest}."
 
 
 def plain_verdict(judged: Mapping[str, Any]) -> str:
@@ -224,8 +224,8 @@ def not_listed(document: dict[str, Any]) -> str:
     """A sentence with the number of effects that this plan cannot show, or only in part; empty where it shows all."""
     part = len({row["effect"] for row in document.get("unseen_in_part", ())})
     counts = (("cannot show {}", len(document["unseen"])), ("shows {} only in part", part))
-    told = [what.format(number_of(count, "effect")) for what, count in counts if count]
-    return f"This plan {' and '.join(told)}" if told else ""
+    counted = [what.format(number_of(count, "effect")) for what, count in counts if count]
+    return f"This plan {' and '.join(counted)}" if counted else ""
 
 
 def unexplained_text(document: dict[str, Any]) -> str:

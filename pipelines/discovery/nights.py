@@ -132,10 +132,10 @@ def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> 
     # an alarm that was raised stays, also where a run that carried it was taken out since
     index = {_text_of(state, at): at for at in range(state.sensor.size + state.station.count)}
     state.alarms += state.unknown(
-        Alarm(told["driver"], index[told["column"]], night["night"], told["lots"], told["log_e"])
+        Alarm(alarm["driver"], index[alarm["column"]], night["night"], alarm["lots"], alarm["log_e"])
         for night in nights
-        for told in night["alarms"]
-        if told["column"] in index
+        for alarm in night["alarms"]
+        if alarm["column"] in index
     )
     return state
 

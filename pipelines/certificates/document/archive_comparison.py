@@ -78,9 +78,9 @@ def _made_again(
     """The document of the day of issue, and, where the certificate was replaced since, the document that names its successor."""
     first = compose(run, replace(calibration, ended_by=None), known, who or NOBODY)
     if who is None:
-        said = laboratory_in(root, first)
-        method = f"{said.method.procedure}. {first.method}" if said.method.procedure else first.method
-        first = first.model_copy(update={"who": said, "method": method})
+        laboratory = laboratory_in(root, first)
+        method = f"{laboratory.method.procedure}. {first.method}" if laboratory.method.procedure else first.method
+        first = first.model_copy(update={"who": laboratory, "method": method})
     if calibration.ended_by is None or calibration.ended_by.action == "revoke":
         return [first]
     named = first.amendment.model_copy(update={"replaced_by": calibration.ended_by.certificate})
@@ -221,10 +221,10 @@ def laboratory_in(root: Any, archived: CertificateContent) -> LaboratoryFile:
     def administrative(path: str) -> str:
         return first(root, f"/*/dcc:administrativeData/{path}/text()")
 
-    said: dict[str, dict[str, Any]] = {
+    stated: dict[str, dict[str, Any]] = {
         table: {key: administrative(path) for key, path in paths.items()} for table, paths in STATED.items()
     }
-    said["item"]["received"] = said["item"]["received"] or None
+    stated["item"]["received"] = stated["item"]["received"] or None
     known = set(statements_of(archived))
     other = [text for text in statements(root) if text not in known]
     claim, deviations = (
@@ -233,15 +233,15 @@ def laboratory_in(root: Any, archived: CertificateContent) -> LaboratoryFile:
     )
     number = administrative(f"{LABORATORY}/dcc:calibrationLaboratoryCode")
     if claim or number:
-        said["laboratory"]["accreditation"] = {"body": claim.removesuffix(f", {number}"), "number": number}
+        stated["laboratory"]["accreditation"] = {"body": claim.removesuffix(f", {number}"), "number": number}
     used = "/*/dcc:measurementResults/dcc:measurementResult/dcc:usedMethods/dcc:usedMethod"
     method = first(root, f"{used}/dcc:description/dcc:content/text()")
-    said["method"] = {
+    stated["method"] = {
         "procedure": method.removesuffix(archived.method).removesuffix(". "),
         "deviations": deviations,
         "remarks": next((text for text in other if not text.startswith((ACCREDITED, DEVIATIONS))), ""),
     }
-    return LaboratoryFile.model_validate(said)
+    return LaboratoryFile.model_validate(stated)
 
 
 def said_by(who: LaboratoryFile) -> str:

@@ -211,7 +211,7 @@ def facts_of(root: Any) -> CertificateFacts:
     """
     if root.tag != f"{{{DCC}}}digitalCalibrationCertificate":
         raise SignatureBroken(f"it is not a Digital Calibration Certificate: its root element is {root.tag}")
-    said = [text.strip() for text in statements(root)]
+    texts = [text.strip() for text in statements(root)]
     core = "/*/dcc:administrativeData/dcc:coreData"
     run = f"{core}/dcc:identifications/dcc:identification[dcc:name/dcc:content='run']/dcc:value/text()"
     serial = (
@@ -222,9 +222,9 @@ def facts_of(root: Any) -> CertificateFacts:
         number=first(root, f"{core}/dcc:uniqueIdentifier/text()"),
         serial=first(root, serial),
         run=first(root, run),
-        issued=_matched(ISSUED, said),
-        coefficients=_matched(COEFFICIENTS, said),
-        simulated=any(text.startswith("SIMULATED") for text in said),
+        issued=_matched(ISSUED, texts),
+        coefficients=_matched(COEFFICIENTS, texts),
+        simulated=any(text.startswith("SIMULATED") for text in texts),
     )
 
 
