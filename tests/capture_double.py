@@ -14,7 +14,7 @@ from root_process import ROOT
 
 from inertial.frames import force_from_angles
 from pipelines.archive import Archive, Records, Run
-from pipelines.archive.signatures import key_place
+from pipelines.archive.signatures import key_file
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job, Request
@@ -222,7 +222,7 @@ def _copied(
 ) -> Run:
     """A copy of the run that ``make`` gives for another folder, once; or what it gives for this one."""
     root = folder / "archive"
-    if root.exists() or key_place() is not None:
+    if root.exists() or key_file() is not None:
         return make(folder)
     recipe_file(folder, *changes)  # it stands beside the archive
     which = sha256(repr((sorted(faults.items()), changes)).encode()).hexdigest()[:16]

@@ -63,7 +63,7 @@ def _copies(folder: Path, count: int, seed: int) -> None:
     """Runs with other names, days and serials, and the scores of them with other signs."""
     source = DiscoveryArchive(Archive(str(folder)))
     products = source.store.products[0]
-    runs = [source.store.run(run) for run in source.store.place]
+    runs = [source.store.run(run) for run in source.store.rows]
     rng = np.random.default_rng(seed)
     new: list[ScoredRun] = []
     for number in range(count):

@@ -20,8 +20,8 @@ from pipelines.archive.packed_path import with_packs
 from pipelines.archive.provenance import provenance
 from pipelines.archive.records import Records
 from pipelines.archive.run import START, Run, names_in
-from pipelines.archive.signatures import key_place
-from pipelines.archive.store import Place, address_of, place_of
+from pipelines.archive.signatures import key_file
+from pipelines.archive.store import Place, address_of, path_of
 from schemas.errors import ArchiveUnusable, WrongUse, close_matches, did_you_mean
 
 if TYPE_CHECKING:
@@ -40,19 +40,19 @@ def _few(names: Sequence[str]) -> str:
 
 
 def default_root() -> Place:
-    """The default place of the archive: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
-    return with_packs(place_of(os.environ.get("TUMBLELINE_ARCHIVE") or "archive"))
+    """The default root of the archive: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
+    return with_packs(path_of(os.environ.get("TUMBLELINE_ARCHIVE") or "archive"))
 
 
 class Archive:
     """A folder of captures and runs, on a disk or in an object store."""
 
     def __init__(self, root: Place | str | None = None) -> None:
-        self.root: Place = with_packs(place_of(root)) if root is not None else default_root()
+        self.root: Place = with_packs(path_of(root)) if root is not None else default_root()
 
     @property
     def address(self) -> str:
-        """By what another process opens the same archive."""
+        """The address by which another process opens this archive."""
         return address_of(self.root)
 
     @property
@@ -77,7 +77,7 @@ class Archive:
         files.publish(mark, self.mark)
 
     def refuse_none(self) -> None:
-        """Refuse a place that holds no archive, or one of another format."""
+        """Refuse a root that holds no archive, or an archive of another format."""
         if not (self.root / "archive.json").is_file():
             raise ArchiveUnusable(
                 f"archive: folder '{self.root}' holds no archive, one with runs is needed; name it with --archive or "
@@ -104,8 +104,8 @@ class Archive:
 
     def first_run_of(self, capture_id: str, units: Sequence[str]) -> Run | None:
         """The run that measured a capture; None where no run of these units is of it. Later ones analyse the same data again."""
-        same = (info.id for info in self.runs() if not info.rerun_of and info.units == tuple(units))
-        return next((run for one in same if (run := Run(self, one)).about.get("capture") == capture_id), None)
+        ids = (info.id for info in self.runs() if not info.rerun_of and info.units == tuple(units))
+        return next((run for run_id in ids if (run := Run(self, run_id)).about.get("capture") == capture_id), None)
 
     def capture(self, capture_id: str) -> Records:
         """The records of a capture, for reading or for continuing."""
@@ -118,12 +118,14 @@ class Archive:
             return Run(self, name)
         if name == "latest" and (infos := self.runs()):
             return Run(self, infos[-1].id)
-        ids = [one for one in self.run_ids() if (self.root / "runs" / one / START).is_file()]
-        matches = [one for one in ids if name and one.startswith(name)]
+        ids = [run_id for run_id in self.run_ids() if (self.root / "runs" / run_id / START).is_file()]
+        matches = [run_id for run_id in ids if name and run_id.startswith(name)]
         if len(matches) == 1:
             return Run(self, matches[0])
         where = f"archive {self.root}"
-        if not matches and (lost := [one for one in self.without_start(set(ids)) if name and one.startswith(name)]):
+        if not matches and (
+            lost := [run_id for run_id in self.without_start(set(ids)) if name and run_id.startswith(name)]
+        ):
             raise ArchiveUnusable(
                 f"{where}: folder runs/{lost[0]} has no {START}; restore it from a copy, see 'tumbleline verify'"
             )
@@ -150,20 +152,22 @@ class Archive:
 
     def without_start(self, known: Collection[str]) -> list[str]:
         """Folders with files of a run, whose ``run.json`` is gone: no command can read them; ``known`` are runs that have it."""
-        found = ((one, names_in(self.root / "runs" / one)) for one in self.run_ids() if one not in known)
+        found = ((run_id, names_in(self.root / "runs" / run_id)) for run_id in self.run_ids() if run_id not in known)
         return [
-            one for one, names in found if START not in names and any(n.endswith((".json", ".parquet")) for n in names)
+            run_id
+            for run_id, names in found
+            if START not in names and any(n.endswith((".json", ".parquet")) for n in names)
         ]
 
     def run_ids(self) -> list[str]:
         """Names of the runs in alphabetical order; a run that is being created at the moment may be among them."""
         self._refuse_other_format()
         folder = self.root / "runs"
-        return sorted(place.name for place in folder.iterdir()) if folder.is_dir() else []
+        return sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
 
     def _refuse_key_within(self) -> None:
         """Refuse a signing key inside the archive: who can edit the archive could sign with it."""
-        key = key_place()
+        key = key_file()
         if key is not None and isinstance(self.root, Path) and key.resolve().is_relative_to(self.root.resolve()):
             raise ArchiveUnusable(
                 f"archive: signing key {key} lies in archive {self.root}, one outside is needed; move it elsewhere"

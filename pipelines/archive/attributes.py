@@ -1,4 +1,4 @@
-"""What an archive knows of units and runs beside the measurement: wafer, supplier, batch, firmware, operator, date of assembly.
+"""Attributes of units and runs beside the measurement: wafer, supplier, batch, firmware, operator, date of assembly.
 
 One file for each time that something was added; a changed value is a new row, and the newest one counts.
 """
@@ -28,8 +28,8 @@ class Attributes:
 
     def of(self, serial: str, run: str, name: str) -> str:
         """The value of a unit in a run: its own, or that of the run; empty where neither is known."""
-        own = self.serial.get(serial, {}).get(name, "")
-        return own or self.run.get(run, {}).get(name, "")
+        of_unit = self.serial.get(serial, {}).get(name, "")
+        return of_unit or self.run.get(run, {}).get(name, "")
 
 
 def known_attributes(archive: Archive) -> Attributes:
@@ -48,4 +48,4 @@ def attribute_files(archive: Archive) -> list[Any]:
     folder = archive.root / FOLDER
     if not folder.is_dir():
         return []
-    return sorted((path for path in folder.iterdir() if path.name.endswith(".json")), key=lambda one: one.name)
+    return sorted((path for path in folder.iterdir() if path.name.endswith(".json")), key=lambda path: path.name)

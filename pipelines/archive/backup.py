@@ -88,12 +88,12 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
         if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK and not DERIVED.fullmatch(name)
     ]
     names += _late_seals(source.root, entries, set(names))
-    kept = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, chain, copied)]
+    damaged = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, chain, copied)]
     _drop_old_states(source.root, target.root)
-    if kept:
+    if damaged:
         raise ArchiveUnusable(
-            f"backup: {len(kept)} files of {source.root} are damaged and sound in {target.root}, where they were kept (the "
-            f"first is {min(kept)}); run 'tumbleline verify', and restore these files from {target.root}"
+            f"backup: {len(damaged)} files of {source.root} are damaged and sound in {target.root}, where they were kept (the "
+            f"first is {min(damaged)}); run 'tumbleline verify', and restore these files from {target.root}"
         )
     if links:
         raise ArchiveUnusable(
@@ -118,10 +118,10 @@ def _late_seals(root: Place, entries: set[str], names: set[str]) -> list[str]:
     return late
 
 
-def _manifest(place: Place) -> dict[str, Any]:
+def _manifest(path: Place) -> dict[str, Any]:
     """The content of a manifest; empty where it is not written yet, or damaged, which 'tumbleline verify' reports."""
     try:
-        return files.read_json(place)
+        return files.read_json(path)
     except ArchiveUnusable:
         return {}
 
@@ -134,12 +134,12 @@ def _as_stated(root: Place, name: str, chain: _ChainAtStart) -> bool | None:
 
 def _stated(root: Place, name: str) -> str:
     """Hash of a file as the manifest beside it states it; empty where none does."""
-    folder, _, own = name.rpartition("/")
-    record = name.startswith("captures/") and own.endswith(WRITTEN_ONCE)
-    if not record and not own.endswith((WRITTEN_ONCE, PAGE)):
+    folder, _, file = name.rpartition("/")
+    record = name.startswith("captures/") and file.endswith(WRITTEN_ONCE)
+    if not record and not file.endswith((WRITTEN_ONCE, PAGE)):
         return ""
-    manifest = _manifest(root / folder / ("record.json" if record else f"{own.rpartition('.')[0]}.json"))
-    return str(manifest.get("content", {}).get(own, "") if record else manifest.get("sha256", ""))
+    manifest = _manifest(root / folder / ("record.json" if record else f"{file.rpartition('.')[0]}.json"))
+    return str(manifest.get("content", {}).get(file, "") if record else manifest.get("sha256", ""))
 
 
 def _is_damaged(source: Place, target: Place, name: str, chain: _ChainAtStart) -> bool:
@@ -172,41 +172,41 @@ def _walk(folder: Place, prefix: str, links: list[str]) -> Iterator[str]:
 
 
 def _copy(source: Place, target: Place, name: str, chain: _ChainAtStart, copied: Copied) -> bool:
-    """Copy a file unless it is there; one that vanished meanwhile (a state, a temporary file) is left out, as is a newer seal.
+    """Copy a file unless it is there; a file that vanished meanwhile (state, temporary) is left out, as is a newer seal.
 
-    False where the one of the target was kept, because that of the source is damaged.
+    False where the copy in the target stays, because the file of the source is damaged.
     """
-    there, place = source / name, target / name
+    from_path, to_path = source / name, target / name
     try:
-        if place.is_file() and _same(there, place, name):
+        if to_path.is_file() and _same(from_path, to_path, name):
             copied.present += 1
             return True
-        if place.is_file() and _is_damaged(source, target, name, chain):
+        if to_path.is_file() and _is_damaged(source, target, name, chain):
             return False
-        data = there.read_bytes()
+        data = from_path.read_bytes()
     except FileNotFoundError:
         return True
     if chain.lacks_entry_of(name, data):
         return True
-    files.publish(place, data)
-    if files.sha256(place) != files.hash_of(data):
-        raise ArchiveUnusable(f"backup: {place} was read differently than it was written; check the disk of the copy")
+    files.publish(to_path, data)
+    if files.sha256(to_path) != files.hash_of(data):
+        raise ArchiveUnusable(f"backup: {to_path} was read differently than it was written; check the disk of the copy")
     copied.files += 1
     copied.bytes += len(data)
     return True
 
 
-def _same(there: Place, place: Place, name: str) -> bool:
-    if there.stat().st_size != place.stat().st_size:
+def _same(from_path: Place, to_path: Place, name: str) -> bool:
+    if from_path.stat().st_size != to_path.stat().st_size:
         return False
-    return name.endswith(WRITTEN_ONCE) or files.sha256(there) == files.sha256(place)
+    return name.endswith(WRITTEN_ONCE) or files.sha256(from_path) == files.sha256(to_path)
 
 
 def _refuse_itself(source: Archive, target: Archive) -> None:
-    root, place = source.root, target.root
-    inside = isinstance(root, Path) and isinstance(place, Path) and place.resolve().is_relative_to(root.resolve())
-    if inside or str(root) == str(place):
-        raise WrongUse(f"backup: {place} lies in the archive {root}, another disk or store is needed; name one")
+    root, to_root = source.root, target.root
+    inside = isinstance(root, Path) and isinstance(to_root, Path) and to_root.resolve().is_relative_to(root.resolve())
+    if inside or str(root) == str(to_root):
+        raise WrongUse(f"backup: {to_root} lies in the archive {root}, another disk or store is needed; name one")
 
 
 def _refuse_another(source: Archive, target: Archive, entries: set[str]) -> None:
@@ -227,11 +227,11 @@ def _drop_old_states(source: Place, target: Place) -> None:
     """
     captures = target / "captures"
     for capture in captures.iterdir() if captures.is_dir() else ():
-        there = source / "captures" / capture.name
-        if _records(capture) > _records(there):
+        original = source / "captures" / capture.name
+        if _records(capture) > _records(original):
             continue
         for old in (capture / STATE).glob("*.bin") if (capture / STATE).is_dir() else ():
-            if not (there / STATE / old.name).is_file():
+            if not (original / STATE / old.name).is_file():
                 old.unlink(missing_ok=True)
 
 

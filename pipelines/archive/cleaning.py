@@ -24,7 +24,7 @@ AT_ONCE = 1000  # calibrations named by one entry of the chain
 class Cleaned:
     """The result of a cleaning.
 
-    removed : places of the temporary files and folders
+    removed : paths of the temporary files and folders
     busy : folders that another process writes to; they were not touched
     sealed : finished runs that were missing in the chain and are in it now
     anchored : number of calibrations that were missing in the chain and are in it now
@@ -43,8 +43,8 @@ def clean(archive: Archive, *, only_look: bool = False) -> Cleaned:
     only_look : remove nothing and write nothing.
     """
     done = Cleaned()
-    for place in list(_left(archive.root)):
-        _remove(archive, place, done, only_look=only_look)
+    for path in list(_left(archive.root)):
+        _remove(archive, path, done, only_look=only_look)
     if not only_look:
         _seal(archive, done)
         _anchor(archive, done)
@@ -54,39 +54,39 @@ def clean(archive: Archive, *, only_look: bool = False) -> Cleaned:
 def _left(root: Place) -> Iterator[Place]:
     """Temporary files and folders, and claims of dead processes."""
     if isinstance(root, ObjectPath):
-        claims = [place for place in root.walk() if place.name.startswith(CLAIM)]
-        newest = max((place.stat().st_mtime for place in claims), default=0.0)
-        yield from (place for place in claims if newest - place.stat().st_mtime > LEASE_S)
+        claims = [path for path in root.walk() if path.name.startswith(CLAIM)]
+        newest = max((claim.stat().st_mtime for claim in claims), default=0.0)
+        yield from (claim for claim in claims if newest - claim.stat().st_mtime > LEASE_S)
         return
     for top in (root, *(root / name for name in FOLDERS)):
         for folder, below, names in os.walk(top):
-            here = [name for name in (*below, *names) if name.startswith(files.TEMPORARY)]
-            below[:] = [] if top == root else [name for name in below if name not in here]
-            yield from (Path(folder) / name for name in sorted(here))
+            temporary = [name for name in (*below, *names) if name.startswith(files.TEMPORARY)]
+            below[:] = [] if top == root else [name for name in below if name not in temporary]
+            yield from (Path(folder) / name for name in sorted(temporary))
 
 
-def _remove(archive: Archive, place: Place, done: Cleaned, *, only_look: bool) -> None:
-    with _owned(archive, place) as mine:
+def _remove(archive: Archive, path: Place, done: Cleaned, *, only_look: bool) -> None:
+    with _owned(archive, path) as mine:
         if not mine:
-            done.busy.append(str(place.parent))
+            done.busy.append(str(path.parent))
             return
         try:
-            done.bytes += _size(place)
+            done.bytes += _size(path)
             if not only_look:
-                with files.writing(place):
-                    shutil.rmtree(place) if isinstance(place, Path) and place.is_dir() else place.unlink()
+                with files.writing(path):
+                    shutil.rmtree(path) if isinstance(path, Path) and path.is_dir() else path.unlink()
         except FileNotFoundError:  # published or removed by another process
             return
-        done.removed.append(str(place))
+        done.removed.append(str(path))
 
 
 @contextmanager
-def _owned(archive: Archive, place: Place) -> Generator[bool, None, None]:
-    """Whether no other process writes to the run, the capture or the folder of a place."""
-    if isinstance(place, ObjectPath):
+def _owned(archive: Archive, path: Place) -> Generator[bool, None, None]:
+    """Whether no other process writes to the run, the capture or the folder that a path is in."""
+    if isinstance(path, ObjectPath):
         yield True
         return
-    parts = place.relative_to(str(archive.root)).parts
+    parts = path.relative_to(str(archive.root)).parts
     with ExitStack() as held:
         if parts[0] in {"runs", "captures"} and len(parts) > 2:
             try:
@@ -94,13 +94,13 @@ def _owned(archive: Archive, place: Place) -> Generator[bool, None, None]:
             except OperatorNeeded:
                 yield False
                 return
-        yield held.enter_context(files.writers_of(place.parent, host.EXCLUSIVE | host.AT_ONCE))
+        yield held.enter_context(files.writers_of(path.parent, host.EXCLUSIVE | host.AT_ONCE))
 
 
-def _size(place: Place) -> int:
-    if isinstance(place, Path) and place.is_dir():
-        return sum(path.stat().st_size for path in place.rglob("*") if path.is_file())
-    return place.stat().st_size
+def _size(path: Place) -> int:
+    if isinstance(path, Path) and path.is_dir():
+        return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+    return path.stat().st_size
 
 
 def _seal(archive: Archive, done: Cleaned) -> None:
@@ -120,9 +120,9 @@ def _seal(archive: Archive, done: Cleaned) -> None:
 def _anchor(archive: Archive, done: Cleaned) -> None:
     """Add calibrations to the chain that are missing there."""
     known: set[str] = set()
-    for _, place in hash_chain.entries(archive.root):
-        if place.is_file():
-            known |= files.read_json(place)["files"].keys()
+    for _, path in hash_chain.entries(archive.root):
+        if path.is_file():
+            known |= files.read_json(path)["files"].keys()
     left = [name for name in _calibrations(archive.root) if name not in known]
     for start in range(0, len(left), AT_ONCE):
         part = {name: files.sha256(archive.root / name) for name in left[start : start + AT_ONCE]}
@@ -132,7 +132,7 @@ def _anchor(archive: Archive, done: Cleaned) -> None:
 
 def _calibrations(root: Place) -> Iterator[str]:
     top, length = root / "calibrations", len(str(root))
-    places = top.walk() if isinstance(top, ObjectPath) else sorted(top.glob("*/*/*.json"))
-    for place in places:
-        if hash_chain.is_number(place.stem):
-            yield str(place)[length:].lstrip(os.sep).replace(os.sep, "/")
+    paths = top.walk() if isinstance(top, ObjectPath) else sorted(top.glob("*/*/*.json"))
+    for path in paths:
+        if hash_chain.is_number(path.stem):
+            yield str(path)[length:].lstrip(os.sep).replace(os.sep, "/")

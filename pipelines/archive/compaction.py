@@ -62,9 +62,9 @@ def compact(archive: Archive, before: str = "") -> Compacted:
         _refuse_open(root)
         files.sweep(root / packs.FOLDER)
         remove_replaced(root)
-        for place in (root / packs.FOLDER).glob(f"*{packs.CONTAINER}"):
-            if not place.with_suffix(packs.CONTENTS).is_file():  # a compaction was killed before it was there
-                place.unlink()
+        for container in (root / packs.FOLDER).glob(f"*{packs.CONTAINER}"):
+            if not container.with_suffix(packs.CONTENTS).is_file():  # a compaction was killed before it was there
+                container.unlink()
         known = packs.Packs(root)
         months = _runs_by_month(archive, root, before, done)
         for month, folders in sorted(months.items()):
@@ -111,9 +111,9 @@ def _runs_by_month(archive: Archive, root: Path, before: str, done: Compacted) -
     """Folders of finished runs with single files and of their captures, by the month in which the run began."""
     out: dict[str, list[str]] = {}
     captures: set[str] = set()
-    there = sorted(place.name for place in (root / "runs").iterdir()) if (root / "runs").is_dir() else []
+    run_names = sorted(folder.name for folder in (root / "runs").iterdir()) if (root / "runs").is_dir() else []
     open_captures = any(_has_single(root / name) for name in _below(root, "captures"))
-    for name in there:
+    for name in run_names:
         if not open_captures and not _has_single(root / "runs" / name):
             continue  # packed but for its page: most runs of an old archive
         if not (archive.root / "runs" / name / START).is_file():
@@ -125,18 +125,18 @@ def _runs_by_month(archive: Archive, root: Path, before: str, done: Compacted) -
         if not (archive.root / "runs" / name / SEALED).is_file():
             done.unfinished.append(name)
             continue
-        own = out.setdefault(began[:7] if MONTH.fullmatch(began[:7]) else "undated", [])
-        own.append(f"runs/{name}")
+        folders = out.setdefault(began[:7] if MONTH.fullmatch(began[:7]) else "undated", [])
+        folders.append(f"runs/{name}")
         if capture and capture not in captures and (root / "captures" / capture / COMPLETE).is_file():
             captures.add(capture)
-            own.append(f"captures/{capture}")
+            folders.append(f"captures/{capture}")
     return out
 
 
 def _below(root: Path, *kinds: str) -> list[str]:
     """Folders that lie by themselves, by their names below the root."""
     tops = ((kind, root / kind) for kind in kinds)
-    return [f"{kind}/{place.name}" for kind, top in tops if top.is_dir() for place in sorted(top.iterdir())]
+    return [f"{kind}/{folder.name}" for kind, top in tops if top.is_dir() for folder in sorted(top.iterdir())]
 
 
 def _ledger(root: Path) -> list[str]:
@@ -149,12 +149,16 @@ def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[Folde
     """The folders with files that no pack has as they are; files of killed writers, locks and young events are left out."""
     latest = time.time_ns() - int(LEAST_AGE_S * 1e9)
     for name in names:
-        there = known.folder(name)
+        folder = known.folder(name)
         single = dict(_single(root / name))
         if name.startswith(f"{LEDGER}/"):
-            single = {one: at for one, at in single.items() if at[1] < latest and is_number(one.removesuffix(".json"))}
-        packed = {} if there is None else {one: (at.size, at.mtime_ns) for one, at in there.files.items()}
-        new = {one: at for one, at in single.items() if packed.get(one) != at}
+            single = {
+                file: stamp
+                for file, stamp in single.items()
+                if stamp[1] < latest and is_number(file.removesuffix(".json"))
+            }
+        packed = {} if folder is None else {file: (entry.size, entry.mtime_ns) for file, entry in folder.files.items()}
+        new = {file: stamp for file, stamp in single.items() if packed.get(file) != stamp}
         if new:
             yield FolderToPack(name, (root / name).stat().st_mtime_ns, new)
 
@@ -162,14 +166,14 @@ def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[Folde
 def _single(folder: Path, prefix: str = "") -> Iterator[tuple[str, tuple[int, int]]]:
     """Names below a folder, with size and time of each file that the archive wrote."""
     with os.scandir(folder) as inside:
-        for one in sorted(inside, key=lambda entry: entry.name):
-            if one.name.startswith(files.TEMPORARY) or one.is_symlink() or one.name in {LOCK, PAGE}:
+        for entry in sorted(inside, key=lambda item: item.name):
+            if entry.name.startswith(files.TEMPORARY) or entry.is_symlink() or entry.name in {LOCK, PAGE}:
                 continue
-            if one.is_dir():
-                yield from _single(Path(one.path), f"{prefix}{one.name}/")
+            if entry.is_dir():
+                yield from _single(Path(entry.path), f"{prefix}{entry.name}/")
             else:
-                about = one.stat()
-                yield f"{prefix}{one.name}", (about.st_size, about.st_mtime_ns)
+                about = entry.stat()
+                yield f"{prefix}{entry.name}", (about.st_size, about.st_mtime_ns)
 
 
 def _has_single(folder: Path) -> bool:
@@ -181,16 +185,16 @@ def _pack(root: Path, what: str, folders: Iterable[FolderToPack], done: Compacte
     rest = iter(folders)
     while portion := _portion(rest):
         done.packs.append(write_pack(root, what, portion, lambda folder, name: (root / folder / name).read_bytes()))
-        done.packed += sum(len(one.files) for one in portion)
-        done.bytes += sum(one.bytes for one in portion)
+        done.packed += sum(len(folder.files) for folder in portion)
+        done.bytes += sum(folder.bytes for folder in portion)
 
 
 def _portion(folders: Iterator[FolderToPack]) -> list[FolderToPack]:
     """The next folders for one pack."""
     portion, size = list[FolderToPack](), 0
-    while size < LARGEST and (one := next(folders, None)) is not None:
-        portion.append(one)
-        size += one.bytes
+    while size < LARGEST and (folder := next(folders, None)) is not None:
+        portion.append(folder)
+        size += folder.bytes
     return portion
 
 

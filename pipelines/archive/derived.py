@@ -42,12 +42,12 @@ def framed(data: bytes) -> bytes:
     return json.dumps(seal({"data": files.hash_of(data)}), sort_keys=True).encode() + b"\n" + data
 
 
-def unframed(place: Place) -> tuple[bytes, str]:
+def unframed(path: Place) -> tuple[bytes, str]:
     """The content of a sealed file and the state of its seal; no content where the seal is not sound.
 
     Raises OSError, ArchiveUnusable: the file is not there or cannot be read.
     """
-    first, _, data = place.read_bytes().partition(b"\n")
+    first, _, data = path.read_bytes().partition(b"\n")
     try:
         stored = json.loads(first)
     except (ValueError, RecursionError):
@@ -56,10 +56,10 @@ def unframed(place: Place) -> tuple[bytes, str]:
     return (data if state == SOUND else b""), state
 
 
-def warn_of_edits(place: Place) -> None:
+def warn_of_edits(path: Place) -> None:
     """Warn that a cache was edited and is made again."""
     LOGGER.warning(
         "archive: %s was edited since it was made from the archive's files; it is not used and is made again, see 'tumbleline "
         "verify'",
-        place,
+        path,
     )

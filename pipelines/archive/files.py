@@ -66,7 +66,7 @@ def read_json(path: Place) -> dict[str, Any]:
 
 
 def parsed(data: bytes, path: Place) -> dict[str, Any]:
-    """The content of a manifest from its bytes; refused where it names a place outside the archive."""
+    """The content of a manifest from its bytes; refused where it names a file outside the archive."""
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):
@@ -180,8 +180,8 @@ def drop(folder: Place) -> None:
     """Remove the files that were written :func:`ahead`."""
     with writing(folder.parent):
         if isinstance(folder, ObjectPath):
-            for one in folder.walk():
-                one.unlink()
+            for path in folder.walk():
+                path.unlink()
         elif folder.is_dir():
             shutil.rmtree(folder)
 

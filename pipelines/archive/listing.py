@@ -77,9 +77,9 @@ def _sealed_stages(run: Run, names: set[str]) -> list[str]:
     if SEALED not in names:
         return []
     seal = files.read_json(run.path / SEALED)
-    there = {name for name in names if name.endswith(".json") and name != SEALED}
+    manifests = {name for name in names if name.endswith(".json") and name != SEALED}
     named = {name.rpartition("/")[2] for name in seal["files"] if name.startswith("runs/")}
-    return seal.get("stages", []) if there == named else []
+    return seal.get("stages", []) if manifests == named else []
 
 
 GRADES, VERDICT = "grades", "verdict"
@@ -90,10 +90,10 @@ FINISHED = 1  # stamp of a finished run in an object store, whose folders have n
 
 def infos_of(root: Place, runs: Sequence[Run]) -> list[RunInfo]:
     """The lines of runs: from the list where it is up to date, else from their folders."""
-    place = root / "index" / "list.json"
-    known, state = stored_lines(place)
+    path = root / "index" / "list.json"
+    known, state = stored_lines(path)
     if state == derived.EDITED:
-        derived.warn_of_edits(place)
+        derived.warn_of_edits(path)
     stored, lines, new = dict[str, Any](), list[RunInfo](), 0
     for run in runs:
         before, stamp = known.get(run.id), stamp_of(run)
@@ -109,7 +109,7 @@ def infos_of(root: Place, runs: Sequence[Run]) -> list[RunInfo]:
             stored[run.id], new = [stamp, astuple(info)], new + 1
     if new >= FEWEST_NEW or state == derived.EDITED:
         with suppress(ArchiveUnusable):  # a reader without write permission does without the list
-            files.publish(place, files.json_bytes({"runs": stored, "seal": derived.seal({"runs": digest(stored)})}))
+            files.publish(path, files.json_bytes({"runs": stored, "seal": derived.seal({"runs": digest(stored)})}))
     return lines
 
 
@@ -123,12 +123,12 @@ def stamp_of(run: Run) -> int | None:
         return None
 
 
-def stored_lines(place: Place) -> tuple[dict[str, Any], str]:
+def stored_lines(path: Place) -> tuple[dict[str, Any], str]:
     """Stamp and line of every run in the list, and the state of its seal; no lines where the seal is not sound."""
-    if not place.is_file():
+    if not path.is_file():
         return {}, derived.SOUND
     try:
-        content = files.read_json(place)
+        content = files.read_json(path)
     except ArchiveUnusable:
         return {}, derived.EDITED
     lines = content.get("runs")

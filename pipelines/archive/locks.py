@@ -1,4 +1,4 @@
-"""Exclusive access: a block in which no other process writes to a place of the archive.
+"""Exclusive access: a block in which no other process writes to a folder of the archive.
 
 On a disk this is a file lock, which the system releases when a process dies. An object store has no lock, but every client sees
 a new object at once. A process that needs a place puts a claim there and then lists the claims: with another live claim beside
@@ -62,7 +62,7 @@ def _lock_file(folder: Place) -> TextIO:
 
 
 def _is_at(file: TextIO, name: str) -> bool:
-    """Whether an open file is still the one of this name."""
+    """Whether an open file is still the file of this name."""
     try:
         return os.path.samestat(os.fstat(file.fileno()), os.stat(name))  # noqa: PTH116 - as it was opened
     except FileNotFoundError:

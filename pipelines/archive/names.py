@@ -1,4 +1,4 @@
-"""Names in manifests: a file of the archive may refer to places inside the archive only."""
+"""Names in manifests: a file of the archive may refer to files inside the archive only."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -8,11 +8,11 @@ from schemas.errors import ArchiveUnusable
 
 FOLDERS = ("capture", "run", "rerun_of", "taken_from", "parents")  # entries that name folders of the archive
 KEYS = ("content", "inputs", "manifests", "evidence", "events")  # entries whose keys name files of one folder
-PLACES = "files"  # the entry whose keys are places below the archive's root
+PATHS = "files"  # the entry whose keys are paths below the archive's root
 
 
 class NameLeadsOut(ArchiveUnusable):
-    """A manifest that names a place outside of the archive."""
+    """A manifest that names a file outside of the archive."""
 
 
 class LinkInArchive(ArchiveUnusable, OSError):
@@ -48,6 +48,6 @@ def _named(content: Mapping[str, Any]) -> Iterator[tuple[str, str, bool]]:
         names = content.get(entry)
         several = names if isinstance(names, list) else [names] if isinstance(names, str) and names else ()
         yield from ((entry, str(name), is_plain(str(name))) for name in several)
-    for entry in (*KEYS, PLACES):
-        names, sound = content.get(entry), is_below if entry == PLACES else is_plain
+    for entry in (*KEYS, PATHS):
+        names, sound = content.get(entry), is_below if entry == PATHS else is_plain
         yield from ((entry, name, sound(name)) for name in (names if isinstance(names, dict) else ()))

@@ -47,20 +47,20 @@ def write_pack(
     replaced : zips of packs whose files are all in this one; from now on they may be removed
     """
     top = root / packs.FOLDER
-    numbers = [int(place.name[:6]) for place in top.glob(f"*{packs.CONTENTS}") if is_number(place.name[:6])]
+    numbers = [int(path.name[:6]) for path in top.glob(f"*{packs.CONTENTS}") if is_number(path.name[:6])]
     name = f"{max(numbers, default=0) + 1:06d}-{what}"
-    aside, place = top / f"{files.TEMPORARY}{name}", top / f"{name}{packs.CONTAINER}"
+    temporary, container = top / f"{files.TEMPORARY}{name}", top / f"{name}{packs.CONTAINER}"
     with files.writing(top, "archive compact", "make room; nothing was removed"):
         try:
-            lines, total = _filled(aside, portion, read)
-            aside.replace(place)
+            lines, total = _filled(temporary, portion, read)
+            temporary.replace(container)
         finally:
-            aside.unlink(missing_ok=True)
-    about: dict[str, Any] = {"zip": place.name, "sha256": total, "bytes": place.stat().st_size}
+            temporary.unlink(missing_ok=True)
+    about: dict[str, Any] = {"zip": container.name, "sha256": total, "bytes": container.stat().st_size}
     about |= {"replaced": list(replaced)} if replaced else {}
     content = b" ".join(files.json_bytes(about).split()) + b"\n" + b"".join(lines)
     files.publish(top / f"{name}{packs.CONTENTS}", derived.framed(content), "archive compact")
-    return place.name
+    return container.name
 
 
 def _filled(aside: Path, portion: Sequence[FolderToPack], read: Reader) -> tuple[list[bytes], str]:
@@ -93,25 +93,25 @@ PAUSE_S = 0.05  # between new pack and removal: a folder's time of change tells 
 
 
 def merge_packs(root: Path) -> dict[str, list[str]]:
-    """Merge what is due; the zips that each new one replaced, by its name.
+    """Merge the packs that are due; the names of the zips that were replaced, by the name of the new zip.
 
     Only for the holder of the lock of the packs.
     """
     done: dict[str, list[str]] = {}
     by_what: dict[str, list[Path]] = {}
-    for one in packs.Packs(root).contents():
-        by_what.setdefault(one.pack.stem[7:], []).append(one.pack)
-    for what, own in sorted(by_what.items()):
-        due = due_of([place.stat().st_size for place in own])
+    for table in packs.Packs(root).contents():
+        by_what.setdefault(table.pack.stem[7:], []).append(table.pack)
+    for what, paths in sorted(by_what.items()):
+        due = due_of([path.stat().st_size for path in paths])
         if due > 1:
-            merged = _merged_pack(root, what, own[-due:])
+            merged = _merged_pack(root, what, paths[-due:])
             if merged:
-                done[merged] = [place.name for place in own[-due:]]
+                done[merged] = [path.name for path in paths[-due:]]
     return done
 
 
 def due_of(sizes: Sequence[int]) -> int:
-    """How many of the newest packs are to be merged, of packs with these sizes in bytes, oldest first."""
+    """The number of the newest packs to be merged, of packs with these sizes in bytes, oldest first."""
     total, count = 0, 0
     for size in reversed(sizes):
         if count and (size > RATIO * total or total + size > LARGEST):
@@ -123,38 +123,40 @@ def due_of(sizes: Sequence[int]) -> int:
 def remove_replaced(root: Path) -> None:
     """Remove the packs that a later one replaces: a compaction was killed after it had merged them."""
     top = root / packs.FOLDER
-    for one in packs.Packs(root).contents():
-        if derived.unframed(one.place)[1] == derived.EDITED:
+    for table in packs.Packs(root).contents():
+        if derived.unframed(table.path)[1] == derived.EDITED:
             continue
-        older = [str(name) for name in one.about().get("replaced", [])]
-        _remove_packs(top, [name for name in older if is_number(name[:6]) and int(name[:6]) < int(one.place.name[:6])])
+        older = [str(name) for name in table.about().get("replaced", [])]
+        _remove_packs(top, [name for name in older if is_number(name[:6]) and int(name[:6]) < int(table.path.name[:6])])
 
 
-def _merged_pack(root: Path, what: str, own: Sequence[Path]) -> str:
-    """One pack in place of some of one month; empty where later packs have all their files."""
+def _merged_pack(root: Path, what: str, paths: Sequence[Path]) -> str:
+    """Merge packs of a month; the name of the new zip, empty where later packs have all their files."""
     known, top = packs.Packs(root), root / packs.FOLDER
-    tables = [content for content in known.contents() if content.pack in own]
+    tables = [table for table in known.contents() if table.pack in paths]
     names: dict[str, int] = {}  # with the last change of the folder before it was packed
-    for one in tables:
-        if files.sha256(one.pack) != one.about().get("sha256"):
+    for table in tables:
+        if files.sha256(table.pack) != table.about().get("sha256"):
             raise ArchiveUnusable(
-                f"archive compact: {one.pack} has changed since it was made; restore it from a copy (new files are packed, no "
+                f"archive compact: {table.pack} has changed since it was made; restore it from a copy (new files are packed, no "
                 "pack was removed)"
             )
-        for name, folder in one.folders():
+        for name, folder in table.folders():
             names[name] = max(names.get(name, 0), folder.mtime_ns)
     held: dict[tuple[str, str], packs.Member] = {}
     portion = list[FolderToPack]()
     for name, mtime_ns in names.items():
         current = known.folder(name)
-        inside = {} if current is None else {file: one for file, one in current.files.items() if one.pack in own}
-        held |= {(name, file): one for file, one in inside.items()}
+        inside = (
+            {} if current is None else {file: member for file, member in current.files.items() if member.pack in paths}
+        )
+        held |= {(name, file): member for file, member in inside.items()}
         if inside:
-            sizes = {file: (one.size, one.mtime_ns) for file, one in inside.items()}
+            sizes = {file: (member.size, member.mtime_ns) for file, member in inside.items()}
             portion.append(FolderToPack(name, mtime_ns, sizes))
     if not portion:
         return ""
-    replaced = [place.name for place in own]
+    replaced = [path.name for path in paths]
     merged = write_pack(root, what, portion, lambda folder, file: packs.read(held[folder, file]), replaced)
     time.sleep(PAUSE_S)
     _remove_packs(top, replaced)
@@ -164,7 +166,7 @@ def _merged_pack(root: Path, what: str, own: Sequence[Path]) -> str:
 def _remove_packs(top: Path, zips: Sequence[str]) -> None:
     """Remove packs: each table of contents first, without which its zip is nothing."""
     for name in zips:
-        place = top / name
-        if packs.NAME.fullmatch(place.stem) and place.suffix == packs.CONTAINER:
-            place.with_suffix(packs.CONTENTS).unlink(missing_ok=True)
-            place.unlink(missing_ok=True)
+        container = top / name
+        if packs.NAME.fullmatch(container.stem) and container.suffix == packs.CONTAINER:
+            container.with_suffix(packs.CONTENTS).unlink(missing_ok=True)
+            container.unlink(missing_ok=True)

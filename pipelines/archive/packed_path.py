@@ -30,7 +30,7 @@ else:
 
 
 class PackedPath(Base):
-    """A place in a local archive with packs; each archive has its own class, so that every derived path knows its packs."""
+    """A path in a local archive with packs; each archive has its own class, so that every derived path knows its packs."""
 
     known: ClassVar[packs.Packs]
     __slots__ = ()
@@ -65,7 +65,7 @@ class PackedPath(Base):
         return isinstance(self._packed(), int) if mode is None else S_ISDIR(mode)
 
     def _mode(self, *, follow_symlinks: bool = True) -> int | None:
-        """What is here by itself, None for nothing; a folder that may not be looked into is an error, as of any path."""
+        """The mode of an unpacked file or folder at this path, None for none; a folder without permission is an error."""
         try:
             return os.stat(self, follow_symlinks=follow_symlinks).st_mode
         except OSError as problem:
@@ -96,7 +96,7 @@ class PackedPath(Base):
             return file.read()
 
     def iterdir(self) -> Generator[Any, None, None]:
-        """What lies directly below, by itself or packed, in no particular order; refused behind a symbolic link."""
+        """Paths directly below, packed or not, in no particular order; refused behind a symbolic link."""
         self._refuse_link()
         try:
             names = set(os.listdir(self))
@@ -109,7 +109,7 @@ class PackedPath(Base):
         yield from [self / name for name in names]
 
     def glob(self, pattern: str | os.PathLike[str], **options: Any) -> Generator[Any, None, None]:
-        """What lies below and has such a name; with packs every part of the pattern is one level."""
+        """Paths below that match a pattern; with packs each part of the pattern is one level."""
         pattern = str(pattern)  # from Python 3.13 on rglob gives a path
         if "**" in pattern or not self.known.contents():
             yield from super().glob(pattern, **options)
@@ -125,15 +125,15 @@ class PackedPath(Base):
         return name if str(self.known.root) == "." and not name.startswith("/") else ""
 
     def _refuse_link(self) -> None:
-        """Refuse a symbolic link on the way from a top folder, which may be one to another disk, to this place."""
-        above, place = self._below_root().count("/"), str(self)
-        for _ in range(above):
-            if os.path.islink(place):
+        """Refuse a symbolic link on the way from a top folder, which may lead to another disk, to this path."""
+        levels, path = self._below_root().count("/"), str(self)
+        for _ in range(levels):
+            if os.path.islink(path):
                 raise LinkInArchive(
-                    f"archive: {place} is a symbolic link to {os.readlink(place)[:200]}, what it leads to is no part of the "
+                    f"archive: {path} is a symbolic link to {os.readlink(path)[:200]}, what it leads to is no part of the "
                     "archive and is not read; replace it by the content, or remove it"
                 )
-            place = os.path.dirname(place)
+            path = os.path.dirname(path)
 
     def _packed(self) -> packs.Member | int | None:
         """The packed file of this name, or the time of the packed folder; None where no pack has it."""
@@ -166,25 +166,25 @@ class PackedPath(Base):
             return self.known.below(name)
         packed = self.known.folder(parts[0])
         start = f"{parts[1]}/" if parts[1] else ""
-        own = packed.files if packed is not None else ()
-        return {one[len(start) :].partition("/")[0] for one in own if one.startswith(start)}
+        members = packed.files if packed is not None else ()
+        return {file[len(start) :].partition("/")[0] for file in members if file.startswith(start)}
 
 
-def overlay(root: str, place: str = "") -> Path:
-    """The place of an archive, by default its root, as a path that also finds what is packed there."""
-    return _class_of(root, os.path.abspath(root))(place or root)
+def overlay(root: str, path: str = "") -> Path:
+    """A path of an archive, by default its root, that also finds what is packed there."""
+    return _class_of(root, os.path.abspath(root))(path or root)
 
 
-def with_packs(place: Place) -> Place:
-    """The root of an archive that also finds what is packed there; one in an object store has no packs."""
-    return overlay(str(place)) if isinstance(place, Path) and not isinstance(place, PackedPath) else place
+def with_packs(root: Place) -> Place:
+    """The root of an archive that also finds what is packed there; an object store has no packs."""
+    return overlay(str(root)) if isinstance(root, Path) and not isinstance(root, PackedPath) else root
 
 
-def member_of(place: object) -> packs.Member | None:
-    """The packed file of a place that has none by itself; None for any other place."""
-    if not isinstance(place, PackedPath) or os.path.exists(place):
+def member_of(path: object) -> packs.Member | None:
+    """The packed file at a path where no file lies by itself; None for any other path."""
+    if not isinstance(path, PackedPath) or os.path.exists(path):
         return None
-    return place._member()  # noqa: SLF001 - the question of this module
+    return path._member()  # noqa: SLF001 - the question of this module
 
 
 @cache

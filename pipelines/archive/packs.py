@@ -25,14 +25,14 @@ CONTENTS, CONTAINER = ".toc", ".zip"
 NAME = re.compile(r"\d{6}-[0-9a-z-]+")
 FOLDERS_OF = {"runs": 2, "captures": 2, "calibrations": 3}  # parts of the name of a folder that is packed as a whole
 TICK_NS = 2_000_000_000
-LATELY = 256  # folders that are kept
+LATELY = 256  # folders whose contents stay in memory
 LISTINGS = 16  # of the folder while another process merges packs
-SEARCHED = 4  # questions to one table before the places of its folders are kept
+SEARCHED = 4  # look-ups in a table before the offsets of its folders stay in memory
 BEGINNING = re.compile(rb'\n\{"folder":("(?:[^"\\]|\\.)*")')
 
 
 class Member(NamedTuple):
-    """A file in a pack: the zip, the place of its bytes there, and the time of its last change, ns since 1970."""
+    """A file in a pack: the zip, the offset of its bytes there, and the time of its last change, ns since 1970."""
 
     pack: Path
     offset: int
@@ -54,10 +54,10 @@ class PackedFolder:
 class Contents:
     """The table of contents of one pack, searched where it lies."""
 
-    def __init__(self, place: Path) -> None:
-        self.place, self.pack, self.identity = place, place.with_suffix(CONTAINER), identity_of(place)
+    def __init__(self, path: Path) -> None:
+        self.path, self.pack, self.identity = path, path.with_suffix(CONTAINER), identity_of(path)
         self._asked, self._starts = 0, cast("dict[bytes, int] | None", None)
-        with place.open("rb") as file:
+        with path.open("rb") as file:
             self._lines = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
     def folder(self, name: str) -> PackedFolder | None:
@@ -96,7 +96,7 @@ class Contents:
             return line["folder"], PackedFolder(line["mtime_ns"], files)
         except (ValueError, KeyError, TypeError, AttributeError):
             raise ArchiveUnusable(
-                f"archive: {self.place} is damaged, the table of contents of a pack is needed; restore it from a copy"
+                f"archive: {self.path} is damaged, the table of contents of a pack is needed; restore it from a copy"
             ) from None
 
 
@@ -125,9 +125,9 @@ class Packs:
                 break
             with self._lock, suppress(FileNotFoundError):  # packs are merged at this moment
                 self._folders.clear()
-                known = {one.identity: one for one in self._known}
-                places = sorted(place for place in self.top.iterdir() if _is_contents(place))
-                self._known = [known.get(identity_of(place)) or Contents(place) for place in places]
+                known = {table.identity: table for table in self._known}
+                paths = sorted(path for path in self.top.iterdir() if _is_contents(path))
+                self._known = [known.get(identity_of(path)) or Contents(path) for path in paths]
                 if self.top.stat().st_mtime_ns == stamp:
                     # a change within the same tick of the clock leaves the time as it is
                     self._stamp = stamp if time.time_ns() - stamp > TICK_NS else 0
@@ -135,7 +135,7 @@ class Packs:
         if not kind:
             return self._known
         ledger = kind == "calibrations"
-        return [one for one in self._known if one.place.stem.endswith("-calibrations") == ledger]
+        return [table for table in self._known if table.path.stem.endswith("-calibrations") == ledger]
 
     def folder(self, name: str) -> PackedFolder | None:
         """The packed files of a folder; None where no pack has it.
@@ -144,7 +144,7 @@ class Packs:
         """
         tables = self.contents(name.partition("/")[0])
         if name not in self._folders:
-            parts = [one for contents in tables if (one := contents.folder(name))]
+            parts = [part for table in tables if (part := table.folder(name))]
             if len(self._folders) >= LATELY:
                 self._folders.clear()
             self._folders[name] = _together(parts) if parts else None
@@ -154,34 +154,37 @@ class Packs:
         """All packed folders of a kind (``runs``, ``captures``, ``calibrations``), each by its name below the root."""
         out: dict[str, PackedFolder] = {}
         for contents in self.contents(kind):
-            for name, one in contents.folders():
+            for name, folder in contents.folders():
                 if name.startswith(f"{kind}/"):
-                    out[name] = _together([out[name], one]) if name in out else one
+                    out[name] = _together([out[name], folder]) if name in out else folder
         return out
 
     def below(self, name: str) -> set[str]:
         """First parts of the names of what lies below a folder that is not packed as a whole, such as ``runs``."""
         start = f"{name}/"
-        own = (one for contents in self.contents(name.partition("/")[0]) for one in contents.names())
-        return {one.removeprefix(start).partition("/")[0] for one in own if one.startswith(start)}
+        names = (path for contents in self.contents(name.partition("/")[0]) for path in contents.names())
+        return {path.removeprefix(start).partition("/")[0] for path in names if path.startswith(start)}
 
 
 def read_together(members: Mapping[str, Member]) -> dict[str, bytes]:
     """The bytes of files of a folder, by name, in one read for each pack: a disk reads on faster than it seeks."""
     out: dict[str, bytes] = {}
     for pack in {member.pack for member in members.values()}:
-        own = {name: one for name, one in members.items() if one.pack == pack}
-        start = min(one.offset for one in own.values())
-        end = max(one.offset + one.size for one in own.values())
-        whole = memoryview(read(Member(pack, start, end - start, 0)))
-        out |= {name: bytes(whole[one.offset - start : one.offset - start + one.size]) for name, one in own.items()}
+        inside = {name: member for name, member in members.items() if member.pack == pack}
+        start = min(member.offset for member in inside.values())
+        end = max(member.offset + member.size for member in inside.values())
+        block = memoryview(read(Member(pack, start, end - start, 0)))
+        out |= {
+            name: bytes(block[member.offset - start : member.offset - start + member.size])
+            for name, member in inside.items()
+        }
     return out
 
 
-def identity_of(place: Path) -> tuple[str, int, int]:
-    """What tells a file from another one of the same name: an archive may be removed and restored."""
-    about = place.stat()
-    return place.name, about.st_ino, about.st_mtime_ns
+def identity_of(path: Path) -> tuple[str, int, int]:
+    """Name, inode and time of change: they tell a file from another of the same name, as after a restored archive."""
+    about = path.stat()
+    return path.name, about.st_ino, about.st_mtime_ns
 
 
 def read(member: Member) -> bytes:
@@ -231,12 +234,12 @@ def _text(name: str) -> bytes:
     return json.dumps(name).encode()
 
 
-def _is_contents(place: Path) -> bool:
-    named = place.suffix == CONTENTS and NAME.fullmatch(place.stem) is not None
-    return named and place.with_suffix(CONTAINER).is_file() and place.stat().st_size > 0
+def _is_contents(path: Path) -> bool:
+    named = path.suffix == CONTENTS and NAME.fullmatch(path.stem) is not None
+    return named and path.with_suffix(CONTAINER).is_file() and path.stat().st_size > 0
 
 
 def _together(parts: list[PackedFolder]) -> PackedFolder:
     """A folder of several packs, the newest last."""
     files = {name: member for part in parts for name, member in part.files.items()}
-    return PackedFolder(max(one.mtime_ns for one in parts), files)
+    return PackedFolder(max(part.mtime_ns for part in parts), files)

@@ -49,13 +49,13 @@ def decoded(data: bytes, columns: Sequence[str] = ()) -> pa.Table:
     import pyarrow.parquet as pq
 
     file = pq.ParquetFile(pa.BufferReader(data))
-    some = columns and (file.schema_arrow.metadata or {}).get(SCHEMA_MARK) == str(VERSION).encode()
+    selects = columns and (file.schema_arrow.metadata or {}).get(SCHEMA_MARK) == str(VERSION).encode()
     # one small file: a data set reader with threads would take longer than the reading itself
-    return file.read(columns=list(columns) if some else None, use_threads=False)
+    return file.read(columns=list(columns) if selects else None, use_threads=False)
 
 
 def _remedy(path: Place) -> str:
-    """What to do about a damaged table: what a run computed can be made again, what a capture holds only be measured again."""
+    """The remedy for a damaged table: results of a run can be computed again, those of a capture only be measured again."""
     restore = "restore it from a copy that 'tumbleline archive backup' made"
     found = _FOLDER.match(str(path))
     if found is None:

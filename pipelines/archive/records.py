@@ -53,7 +53,7 @@ class Events:
         return _table([{name: getattr(event, name) for name in columns} for event in self.recorded()], columns)
 
     def soaks(self) -> pd.DataFrame:
-        """How long each soak took, and overshoot of air and devices: the table ``soaks`` of the archive."""
+        """Duration of each soak, and overshoot of air and devices: the table ``soaks`` of the archive."""
         soaks = [event for event in self.recorded() if event.kind == "soak" and event.figures]
         rows = [{"time_s": soak.time_s, "record": soak.record, **soak.figures} for soak in soaks]
         return _table(rows, {"time_s": float, "record": "int64", **dict.fromkeys(SOAK_FIGURES, float)})
@@ -114,11 +114,11 @@ class Records:
 
         The parts are of no use without the record: one that was killed on its way is measured again, since noise has no gaps.
         """
-        place = files.ahead(self.path / f"{record:05d}")
+        folder = files.ahead(self.path / f"{record:05d}")
         if number == 0:
             self._forget(record)
         name, data = f"samples-{number:05d}.parquet", self._encoded("samples", samples)
-        files.publish(place / name, data)
+        files.publish(folder / name, data)
         self._ahead[name] = files.hash_of(data)
 
     def put(
@@ -182,7 +182,7 @@ class Records:
         return digest({f.name: files.read_json(f / "record.json")["content"] for f in self._folders()})
 
     def samples(self, records: Collection[int] | None = None) -> Iterator[pd.DataFrame]:
-        """The samples, one table per record in order of record, or several of a long one: they never lie in memory together.
+        """The samples, one table per record in order of record, or several for a long record: they never lie in memory together.
 
         records : numbers of those that are wanted; all where None
         """
@@ -195,16 +195,16 @@ class Records:
         import pandas as pd
 
         parts = [frame for folder in self._folders() for frame in self._frames(folder, part)]
-        kept = [frame for frame in parts if len(frame)] or parts[:1]
-        return pd.concat(kept, ignore_index=True)
+        filled = [frame for frame in parts if len(frame)] or parts[:1]
+        return pd.concat(filled, ignore_index=True)
 
     def _folders(self) -> list[Place]:
         """Folders of the records that are stored whole, in order of record."""
         if isinstance(self.path, ObjectPath):  # record.json is put last
-            whole = [one.parent for one in self.path.walk() if one.name == "record.json"]
+            folders = [path.parent for path in self.path.walk() if path.name == "record.json"]
         else:
-            whole = list(self.path.iterdir()) if self.path.is_dir() else []
-        return sorted((folder for folder in whole if is_number(folder.name)), key=lambda folder: folder.name)
+            folders = list(self.path.iterdir()) if self.path.is_dir() else []
+        return sorted((folder for folder in folders if is_number(folder.name)), key=lambda folder: folder.name)
 
     def _last(self) -> Place | None:
         """Folder of the record stored last; None before the first."""

@@ -30,7 +30,7 @@ def stages_of(folder: Place, names: set[str] | None = None) -> list[str]:
 
 def names_in(folder: Place) -> set[str]:
     """Names of the files in a folder; an empty set where the folder does not exist."""
-    return {place.name for place in folder.iterdir()} if folder.is_dir() else set()
+    return {path.name for path in folder.iterdir()} if folder.is_dir() else set()
 
 
 START = "run.json"
@@ -49,11 +49,11 @@ def lost_files(folder: Place, names: set[str]) -> list[str]:
 
 
 class Rooted(Protocol):
-    """The archive as its runs know it: a place."""
+    """What a run needs of its archive: the root."""
 
     @property
     def root(self) -> Place:
-        """Folder or place in an object store."""
+        """Folder, or path in an object store."""
         ...
 
 
@@ -66,24 +66,24 @@ class Run:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What the run was started with: recipe, limits, lot, station, capture; and who, where, when."""
+        """The start of the run: recipe, limits, lot, station, capture; and who, where, when."""
         return files.read_json(self.path / START)
 
     @property
     def origin(self) -> dict[str, str]:
-        """What ``run.json`` of a re-analysis of this run says of it: the run, and when its data were measured."""
+        """Entries of ``run.json`` of a re-analysis: this run, and when its data were measured."""
         about = self.about
         return {"rerun_of": self.id, "measured": str(about.get("measured") or about["when"])}
 
     @property
     def records(self) -> Records | None:
-        """What was captured for this run; None for a run on imported tables."""
+        """Records of the capture of this run; None for a run on imported tables."""
         capture = self.about.get("capture")
         return Records(self.archive.root / "captures" / capture) if capture else None
 
     @property
     def report(self) -> Place:
-        """Where the report for people lies."""
+        """Path of the report."""
         return self.path / "report.html"
 
     def has(self, names: tuple[str, ...], key: str) -> bool:
@@ -172,9 +172,9 @@ class Run:
 
     def manifest(self, name: str) -> dict[str, Any]:
         """The manifest of a table."""
-        place = self.path / f"{name}.json"
-        content = files.read_json(place)
-        refuse_newer(content.get("schema"), str(place))
+        path = self.path / f"{name}.json"
+        content = files.read_json(path)
+        refuse_newer(content.get("schema"), str(path))
         return content
 
     def tables(self) -> list[str]:
@@ -201,8 +201,8 @@ class Run:
 
     def _hash_of(self, name: str) -> str:
         """Hash of a file of the run; empty where it is not there."""
-        place = self.path / name
-        return files.sha256(place) if place.is_file() else ""
+        path = self.path / name
+        return files.sha256(path) if path.is_file() else ""
 
     def _is_made_by(self, name: str, key: str) -> bool:
         path = self.path / f"{name}.parquet"

@@ -24,27 +24,27 @@ VARIABLE = "TUMBLELINE_SIGNING_KEY"
 GOOD, UNSIGNED, UNKNOWN, BAD = "good", "unsigned", "unknown key", "bad"
 
 
-def key_place() -> Path | None:
+def key_file() -> Path | None:
     """The file of the private key: from the environment (none where the variable is empty), else the default file."""
     if VARIABLE in os.environ:
         named = os.environ[VARIABLE].strip()
         return Path(named) if named else None
-    own = default_key_place()
-    return own if own.is_file() else None
+    default = default_key_file()
+    return default if default.is_file() else None
 
 
-def default_key_place() -> Path:
+def default_key_file() -> Path:
     """The default file of the private key of the user."""
     return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "tumbleline" / "signing.key"
 
 
 def signed(content: Mapping[str, Any]) -> dict[str, Any]:
     """The manifest with a signature where a key is configured, without one otherwise."""
-    place = key_place()
+    path = key_file()
     plain = {name: value for name, value in content.items() if name != ENTRY}  # the writer of a copy signs it anew
-    if place is None:
+    if path is None:
         return plain
-    key, name = _private(str(place))
+    key, name = _private(str(path))
     value = base64.b64encode(key.sign(_canonical(plain))).decode()
     return {**plain, ENTRY: {"key": name, "value": value}}
 
@@ -72,15 +72,15 @@ def check(content: Mapping[str, Any], keys: Mapping[str, Ed25519PublicKey]) -> s
 
 
 def public_keys(given: Collection[str] = ()) -> dict[str, Ed25519PublicKey]:
-    """The public keys that are trusted, by name: the given ones, else the one of the configured private key.
+    """The public keys that are trusted, by name: the given keys, else that of the configured private key.
 
     given : files in PEM, or keys as 64 hexadecimal digits.
     """
     if given:
         keys = [_public(text) for text in given]
     else:
-        place = key_place()
-        keys = [_private(str(place))[0].public_key()] if place is not None else []
+        path = key_file()
+        keys = [_private(str(path))[0].public_key()] if path is not None else []
     return {name_of(key): key for key in keys}
 
 
@@ -89,7 +89,7 @@ def name_of(key: Ed25519PublicKey) -> str:
     return sha256(key.public_bytes_raw()).hexdigest()[:16]
 
 
-def make_key(place: Path) -> Ed25519PublicKey:
+def make_key(path: Path) -> Ed25519PublicKey:
     """Make a private key, write it to a file that only its owner can read, and return its public key."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
@@ -97,23 +97,23 @@ def make_key(place: Path) -> Ed25519PublicKey:
     key = Ed25519PrivateKey.generate()
     pem = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with os.fdopen(os.open(place, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
             file.write(pem)
     except FileExistsError:
         raise WrongUse(
-            f"archive key: {place} exists, a new file is needed; keep it, or name another with --output"
+            f"archive key: {path} exists, a new file is needed; keep it, or name another with --output"
         ) from None
     except OSError as problem:
         raise WrongUse(
-            f"archive key: {place} cannot be written ({problem.strerror}); name another file with --output"
+            f"archive key: {path} cannot be written ({problem.strerror}); name another file with --output"
         ) from None
     return key.public_key()
 
 
-def private_key(place: Path) -> Ed25519PrivateKey:
+def private_key(path: Path) -> Ed25519PrivateKey:
     """The private key in a file."""
-    return _private(str(place))[0]
+    return _private(str(path))[0]
 
 
 def _canonical(content: Mapping[str, Any]) -> bytes:
@@ -122,22 +122,22 @@ def _canonical(content: Mapping[str, Any]) -> bytes:
 
 
 @cache
-def _private(place: str) -> tuple[Ed25519PrivateKey, str]:
+def _private(path: str) -> tuple[Ed25519PrivateKey, str]:
     """The private key in a file, and its name."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
     try:
-        key = load_pem_private_key(Path(place).read_bytes(), None)
+        key = load_pem_private_key(Path(path).read_bytes(), None)
     except OSError as problem:
         raise ArchiveUnusable(
-            f"archive: signing key {place} cannot be read ({problem.strerror}); correct {VARIABLE}, or unset it"
+            f"archive: signing key {path} cannot be read ({problem.strerror}); correct {VARIABLE}, or unset it"
         ) from None
     except (ValueError, TypeError):
         key = None
     if not isinstance(key, Ed25519PrivateKey):
         raise ArchiveUnusable(
-            f"archive: {place} is no signing key, an Ed25519 key in PEM without a passphrase is needed; make one with "
+            f"archive: {path} is no signing key, an Ed25519 key in PEM without a passphrase is needed; make one with "
             "'tumbleline archive key'"
         )
     return key, name_of(key.public_key())

@@ -1,4 +1,4 @@
-"""Where an archive lies: a local folder, or a place of any file system that Arrow knows (``s3://bucket/folder?…``).
+"""Where an archive lies: a local folder, or a path of any file system that Arrow knows (``s3://bucket/folder?…``).
 
 A local archive is :class:`pathlib.Path` throughout, at no cost. :class:`ObjectPath` answers to the same few methods for an
 object store, where putting an object is atomic by itself and folders exist only as beginnings of names.
@@ -21,18 +21,18 @@ REMEDY = "check the address, the credentials and the network"
 
 @dataclass(frozen=True)
 class Size:
-    """What is asked of an object's ``stat``: its bytes, and when it was put, seconds since 1970 on the store's clock."""
+    """The ``stat`` of an object: its bytes, and when it was written, seconds since 1970 on the clock of the store."""
 
     st_size: int
     st_mtime: float
 
 
 class ObjectPath:
-    """A place in an object store, with the methods of :class:`pathlib.Path` that the archive uses.
+    """A path in an object store, with the methods of :class:`pathlib.Path` that the archive uses.
 
     system : the file system of pyarrow.
     key : bucket and key, with slashes.
-    scheme : begins the place's name for people.
+    scheme : begins the path as people read it.
     address : the archive's whole address as it was given.
     """
 
@@ -61,7 +61,7 @@ class ObjectPath:
 
     @property
     def parent(self) -> ObjectPath:
-        """The place around this one."""
+        """The path above."""
         return self._at(self.pure.parent)
 
     def is_file(self) -> bool:
@@ -69,7 +69,7 @@ class ObjectPath:
         return self._info().type.name == "File"
 
     def is_dir(self) -> bool:
-        """Whether names of objects begin with this one."""
+        """Whether there are objects below this path."""
         return self._info().type.name == "Directory"
 
     def exists(self) -> bool:
@@ -99,13 +99,13 @@ class ObjectPath:
         return io.BytesIO(self.read_bytes())
 
     def write_bytes(self, data: bytes) -> int:
-        """Put the object, whole or not at all; how many bytes it has."""
+        """Write the object completely or not at all; the number of its bytes."""
         with self.system.open_output_stream(self.key) as stream:  # the caller reports errors of the system
             stream.write(data)
         return len(data)
 
     def unlink(self, *, missing_ok: bool = False) -> None:
-        """Take the object away."""
+        """Remove the object."""
         with self._reached():
             try:
                 self.system.delete_file(self.key)
@@ -114,7 +114,7 @@ class ObjectPath:
                     raise
 
     def remove_all(self) -> None:
-        """Take away everything whose name begins with this one."""
+        """Remove all objects below this path."""
         with self._reached():
             self.system.delete_dir(self.key)
 
@@ -122,11 +122,11 @@ class ObjectPath:
         """Nothing: folders need not be made."""
 
     def resolve(self) -> ObjectPath:
-        """Itself: there are no links."""
+        """The path itself: an object store has no links."""
         return self
 
     def iterdir(self) -> Iterator[ObjectPath]:
-        """What lies directly below, in no particular order."""
+        """Paths directly below, in no particular order."""
         return iter(self._listed(recursive=False))
 
     def walk(self) -> Iterator[ObjectPath]:
@@ -134,7 +134,7 @@ class ObjectPath:
         return iter(self._listed(recursive=True))
 
     def glob(self, pattern: str) -> Iterator[ObjectPath]:
-        """What lies below and has such a name; every part of the pattern is one level."""
+        """Paths below that match a pattern; each part of the pattern is one level."""
         return globbed(self, pattern)
 
     def _at(self, pure: PurePosixPath) -> ObjectPath:
@@ -164,25 +164,25 @@ class ObjectPath:
             ) from None
 
 
-def globbed(place: Any, pattern: str) -> Iterator[Any]:
-    """What lies below a place and has such a name; every part of the pattern is one level."""
+def globbed(folder: Any, pattern: str) -> Iterator[Any]:
+    """Paths below a folder that match a pattern; each part of the pattern is one level."""
     first, _, rest = pattern.partition("/")
-    matches = [place / first]
+    matches = [folder / first]
     if any(mark in first for mark in "*?["):
-        inside = place.iterdir() if place.is_dir() else ()
-        matches = sorted(one for one in inside if fnmatchcase(one.name, first))
-    for one in matches:
+        inside = folder.iterdir() if folder.is_dir() else ()
+        matches = sorted(path for path in inside if fnmatchcase(path.name, first))
+    for path in matches:
         if rest:
-            yield from one.glob(rest)
-        elif one.exists():
-            yield one
+            yield from path.glob(rest)
+        elif path.exists():
+            yield path
 
 
 Place: TypeAlias = Path | ObjectPath
 
 
-def place_of(address: str | Path | ObjectPath) -> Place:
-    """The folder, or the place in an object store, that an address names."""
+def path_of(address: str | Path | ObjectPath) -> Place:
+    """The folder, or the path in an object store, that an address names."""
     if isinstance(address, ObjectPath | Path):
         return address
     if "://" not in address:
@@ -204,13 +204,13 @@ def place_of(address: str | Path | ObjectPath) -> Place:
     return ObjectPath(system, key, scheme, address)
 
 
-def address_of(place: Place) -> str:
+def address_of(path: Place) -> str:
     """An address by which another process finds the same archive."""
-    return place.address if isinstance(place, ObjectPath) else str(place.resolve())
+    return path.address if isinstance(path, ObjectPath) else str(path.resolve())
 
 
 def first_line(problem: Exception) -> str:
-    """What a system says went wrong, without the rest."""
+    """The first line of the message of an exception."""
     text = getattr(problem, "strerror", None) or str(problem) or type(problem).__name__
     return str(text).splitlines()[0]
 

@@ -43,7 +43,7 @@ class Scope:
 
 
 def scope_of(since: str, until: str, device: str, station: str) -> Scope:
-    """What is looked at, from dates as texts; ``until`` holds its whole day."""
+    """The scope of an audit from dates as texts; the day ``until`` is included."""
     first = day_of(checked(since or FIRST, "--since"))
     last = day_of(checked(until or today(), "--until")) + 1.0
     if first >= last:
@@ -115,7 +115,7 @@ def audit(
     later = every_run[every_run["day"] >= scope.tomorrow].sort_values(["day", "run"])
     foreign = tuple(strangers(calibrations, rules))
     good = np.ones(len(calibrations), dtype=bool)
-    good[[one.row for one in foreign]] = False
+    good[[stranger.row for stranger in foreign]] = False
     product = ~np.array([rules.is_standard(str(unit)) for unit in calibrations.unit], dtype=bool)
     inside = product & _of_device(calibrations, scope) & _at(calibrations, scope)
     period = inside & (calibrations.day >= scope.since)
@@ -137,7 +137,7 @@ def audit(
         period=period,
         problems=tuple(left_out(every_run)),
         later=tuple(zip(later["run"], later["day"], strict=True)),
-        strangers=tuple(one for one in foreign if calibrations.day[one.row] >= scope.since),
+        strangers=tuple(stranger for stranger in foreign if calibrations.day[stranger.row] >= scope.since),
         kinds=tuple(kinds),
         units=units,
         due=last_measured(
@@ -170,8 +170,8 @@ def _limits(calibrations: Calibrations, figures: Figures) -> dict[tuple[str, str
     """Limits of the product by device and family, from the decisions on these calibrations."""
     out: dict[tuple[str, str], float] = {}
     for family, (figure, factor) in LIMITED.items():
-        own = np.flatnonzero((figures.figure == figure) & np.isfinite(figures.limit))
-        devices = calibrations.device[figures.row[own]]
+        rows = np.flatnonzero((figures.figure == figure) & np.isfinite(figures.limit))
+        devices = calibrations.device[figures.row[rows]]
         for device in np.unique(devices.astype(str)):
-            out[str(device), family] = factor * float(np.median(figures.limit[own][devices == device]))
+            out[str(device), family] = factor * float(np.median(figures.limit[rows][devices == device]))
     return out

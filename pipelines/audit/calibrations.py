@@ -64,7 +64,7 @@ def codes(texts: NDArray[Any]) -> Index:
 
 
 def day_of(moment: str) -> float:
-    """Days since 1970 of an ISO time; one without zone is UTC."""
+    """Days since 1970 of an ISO time; without a zone it is UTC."""
     instant = datetime.fromisoformat(moment)
     return (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).timestamp() / DAY_S
 
@@ -75,7 +75,7 @@ def date_of(day: float) -> str:
 
 
 def dated_runs(index: AuditIndex) -> pd.DataFrame:
-    """All runs, their columns as texts, with the day of measurement; NaN for one without a date that can be believed."""
+    """All runs, their columns as texts, with the day of measurement; NaN for a run without a plausible date."""
     runs = index.table("runs").to_pandas().astype(str)
     return runs.assign(day=[_day_or_nan(moment) for moment in runs["measured"]])
 
@@ -132,10 +132,10 @@ def _scale_in_ppm(loaded: Calibrations) -> Calibrations:
     values, errors = np.array(loaded.values), np.array(loaded.errors)
     for column in (k for k, name in enumerate(NAMES) if FAMILY_OF[name] == "scale"):
         for device in np.unique(loaded.device.astype(str)):
-            own = loaded.device == device
-            finite = np.isfinite(values[own, column])
+            rows = loaded.device == device
+            finite = np.isfinite(values[rows, column])
             if finite.any():
-                nominal = float(np.median(values[own, column][finite]))
-                values[own, column] = 1e6 * (values[own, column] / nominal - 1.0)
-                errors[own, column] = 1e6 * errors[own, column] / abs(nominal)
+                nominal = float(np.median(values[rows, column][finite]))
+                values[rows, column] = 1e6 * (values[rows, column] / nominal - 1.0)
+                errors[rows, column] = 1e6 * errors[rows, column] / abs(nominal)
     return replace(loaded, values=values, errors=errors)

@@ -56,13 +56,13 @@ def _finding(finding: AuditFinding) -> AuditFindingDocument:
 
 def counts(audit: Audit) -> dict[str, int]:
     """Numbers of audited runs, units and calibrations."""
-    own = audit.all
+    calibrations = audit.all
     return {
-        "calibrations": len(own),
+        "calibrations": len(calibrations),
         "in_period": int(audit.period.sum()),
-        "units": int(own.histories[-1]) + 1 if len(own) else 0,
-        "runs": int(np.unique(own.run.astype(str)).size),
-        "stations": int(np.unique(own.station.astype(str)).size),
+        "units": int(calibrations.histories[-1]) + 1 if len(calibrations) else 0,
+        "runs": int(np.unique(calibrations.run.astype(str)).size),
+        "stations": int(np.unique(calibrations.station.astype(str)).size),
         "unreadable_runs": len(audit.problems),
         "certificates": len(audit.certificates),
     }
@@ -76,26 +76,26 @@ def furthest(audit: Audit, most: int) -> list[UnitDrift]:
 
 
 def _due(audit: Audit) -> DueDocument:
-    own = audit.due
+    due_units = audit.due
 
     def listed(which: Index) -> list[DueUnit]:
         return [
             {
                 "unit": str(audit.all.unit[row]), "device": str(audit.all.device[row]),
-                "last": date_of(float(audit.all.day[row])), "due": date_of(float(own.day[k])), "run": str(audit.all.run[row]),
-                "months": float(own.months[k]), "because": str(own.because[k]),
-                "certificate": str(own.certificate[k]), "valid": bool(own.valid[k]),
+                "last": date_of(float(audit.all.day[row])), "due": date_of(float(due_units.day[k])),
+                "run": str(audit.all.run[row]), "months": float(due_units.months[k]), "because": str(due_units.because[k]),
+                "certificate": str(due_units.certificate[k]), "valid": bool(due_units.valid[k]),
             }
-            for k, row in zip(which, own.row[which], strict=True)
+            for k, row in zip(which, due_units.row[which], strict=True)
         ]  # fmt: skip
 
     return {
         "interval": audit.rules.interval,
-        "units": own.row.size,
-        "valid": int(own.valid.sum()),
+        "units": due_units.row.size,
+        "valid": int(due_units.valid.sum()),
         "overdue": listed(audit.overdue),
         "soon": listed(audit.coming_due),
-        "uncertified": listed(uncertified(audit.all, own, audit.certificates)),
+        "uncertified": listed(uncertified(audit.all, due_units, audit.certificates)),
     }
 
 
@@ -145,9 +145,9 @@ def _series(series: StationSeries) -> dict[str, Any]:
 def weekly(series: StationSeries) -> list[dict[str, Any]]:
     """Means of the weeks: their Monday, number of values, mean."""
     week = np.floor((series.day - 4.0) / 7.0).astype(int)  # 1970-01-05 was a Monday
-    numbers, place = np.unique(week, return_inverse=True)
-    n = np.bincount(place)
-    mean = np.bincount(place, series.value) / n
+    numbers, index = np.unique(week, return_inverse=True)
+    n = np.bincount(index)
+    mean = np.bincount(index, series.value) / n
     return [
         {"week": date_of(7.0 * w + 4.0), "n": int(c), "mean": float(m)}
         for w, c, m in zip(numbers, n, mean, strict=True)

@@ -22,7 +22,7 @@ from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
 from pipelines.audit.rules import Rules
 
 MONTH_D = YEAR_D / 12.0
-OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
+OF_UNIT = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].of_unit)
 FEWEST_PAIRS = 8
 AHEAD = np.arange(0.0, 10.0 + 1e-9, 1.0 / 24.0)  # years, in steps of half a month
 
@@ -56,12 +56,12 @@ def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: fl
     pairs, out = pairs_of(calibrations, good), list[KindDrift]()
     spans = spans_of(calibrations, pairs)
     for device in np.unique(calibrations.device.astype(str)):
-        drifts = (_kind_drift(calibrations, pairs, spans, device, name, rules, since) for name in OWN)
-        own = [drift for drift in drifts if drift is not None]
+        drifts = (_kind_drift(calibrations, pairs, spans, device, name, rules, since) for name in OF_UNIT)
+        found = [drift for drift in drifts if drift is not None]
         months = float("nan")
-        if all(one.known for one in own):
-            months = _reliable_months(calibrations, pairs, own, rules.reliability_target)
-        out += [replace(one, reliable_months=months if np.isfinite(one.tolerance) else float("nan")) for one in own]
+        if all(drift.known for drift in found):
+            months = _reliable_months(calibrations, pairs, found, rules.reliability_target)
+        out += [replace(drift, reliable_months=months if np.isfinite(drift.tolerance) else np.nan) for drift in found]
     return out
 
 

@@ -20,7 +20,7 @@ from pipelines.certificates.validity import Calibration, calibrations_of
 class CertificateState(NamedTuple):
     """The state of a unit in the ledger on a day.
 
-    certificate : the valid one, else the last one, even if it ended; state : its state on that day: ``valid``,
+    certificate : the valid certificate, else the last, even if it ended; state : its state on that day: ``valid``,
         ``ended``, ``revoked`` or ``later`` (it begins later)
     until : day since 1970 with which it ends or ended
     entered : whether the last measurement is certified, in any state
@@ -48,7 +48,7 @@ class Certificates:
 
     def __len__(self) -> int:
         """Number of calibrations."""
-        return sum(len(own) for own in self.of.values())
+        return sum(len(calibrations) for calibrations in self.of.values())
 
     def standing(self, device: str, serial: str, run: str) -> CertificateState | None:
         """The state of a unit; None for a unit that was never certified.
@@ -60,7 +60,7 @@ class Certificates:
         known = self.of.get((device, serial), ())
         if not known:
             return None
-        entered = any(self._measured(one.run) == self._measured(run) for one in known)
+        entered = any(self._measured(calibration.run) == self._measured(run) for calibration in known)
         held, last = self._deciding(known)
         if held is None and last.state == "revoked":
             return CertificateState(last.certificate, "revoked", _end(last), entered)
@@ -69,9 +69,12 @@ class Certificates:
 
     def _deciding(self, known: Sequence[Calibration]) -> tuple[Calibration | None, Calibration]:
         """The calibration that is due first: of a subject without a valid one the last, else the valid one that ends first."""
-        named = dict.fromkeys(subject for one in known for subject in one.event.covers.split())
-        subjects = ([one for one in known if subject in one.event.covers.split()] for subject in named)
-        pairs = [(held := next((one for one in own if one.holds(self.day)), None), held or own[-1]) for own in subjects]
+        subjects = dict.fromkeys(subject for entry in known for subject in entry.event.covers.split())
+        groups = ([entry for entry in known if subject in entry.event.covers.split()] for subject in subjects)
+        pairs = [
+            (held := next((entry for entry in group if entry.holds(self.day)), None), held or group[-1])
+            for group in groups
+        ]
         return next((pair for pair in pairs if pair[0] is None), min(pairs, key=lambda pair: pair[1].until))
 
     def _measured(self, run: str) -> str:
@@ -89,11 +92,11 @@ def certificates_of(root: Place, until: float, captures: Mapping[str, str]) -> C
     """
     day = date_of(until - 1.0)
     histories = histories_of(root)
-    of: dict[tuple[str, str], list[Calibration]] = {}
+    by_unit: dict[tuple[str, str], list[Calibration]] = {}
     for events in histories.units:
-        for one in calibrations_of(event for event in events if event.when[:10] <= day):
-            of.setdefault((one.event.device.upper(), one.serial), []).append(one)
-    return Certificates(day, of, captures, histories.problems)
+        for calibration in calibrations_of(event for event in events if event.when[:10] <= day):
+            by_unit.setdefault((calibration.event.device.upper(), calibration.serial), []).append(calibration)
+    return Certificates(day, by_unit, captures, histories.problems)
 
 
 def _end(revoked: Calibration) -> float:
@@ -110,7 +113,7 @@ class Due:
     months : the interval of the rules
     because : ``fixed`` or ``drift`` (the interval after the last pass), ``certificate`` (it ends, or has ended), ``revoked``, or
         ``did not pass``
-    certificate : the one valid on the day of the audit, else the last one; empty without one
+    certificate : the certificate valid on the day of the audit, else the last; empty without a certificate
     valid : whether a certificate is valid; entered : whether the last measurement is certified, in any state
     """
 
@@ -158,8 +161,8 @@ def last_measured(calibrations: Calibrations, due_units: Due, station: str) -> D
     """The units whose last measurement was on a station; all without a station. Earlier measurements count as history."""
     if not station:
         return due_units
-    own = calibrations.station[due_units.row] == station
-    return Due(*(getattr(due_units, name)[own] for name in Due.__dataclass_fields__))
+    on_station = calibrations.station[due_units.row] == station
+    return Due(*(getattr(due_units, name)[on_station] for name in Due.__dataclass_fields__))
 
 
 def uncertified(calibrations: Calibrations, due_units: Due, certificates: Certificates) -> Index:
@@ -173,17 +176,18 @@ def _by_certificate(calibrations: Calibrations, due_units: Due, certificates: Ce
     """Replace the interval of every unit by the state of its certificate."""
     for k, row in enumerate(due_units.row):
         names = (str(column[row]) for column in (calibrations.device, calibrations.unit, calibrations.run))
-        one = certificates.standing(*names)
-        if one is None:
+        standing = certificates.standing(*names)
+        if standing is None:
             continue
-        due_units.certificate[k], due_units.entered[k] = one.certificate, one.entered
-        due_units.valid[k] = one.state == "valid"
+        due_units.certificate[k], due_units.entered[k] = standing.certificate, standing.entered
+        due_units.valid[k] = standing.state == "valid"
         # measured again after its end: the interval counts from the measurement
-        if not due_units.valid[k] and not one.entered:
+        if not due_units.valid[k] and not standing.entered:
             continue
-        if due_units.because[k] == "drift" and one.state != "revoked" and due_units.day[k] < one.until:
+        if due_units.because[k] == "drift" and standing.state != "revoked" and due_units.day[k] < standing.until:
             continue
-        due_units.day[k], due_units.because[k] = one.until, "revoked" if one.state == "revoked" else "certificate"
+        due_units.day[k] = standing.until
+        due_units.because[k] = "revoked" if standing.state == "revoked" else "certificate"
 
 
 def _by_drift(
@@ -202,8 +206,8 @@ def _by_drift(
             of_kind[kind.device] = min(of_kind.get(kind.device, np.inf), kind.reliable_months)
     for k, row in enumerate(last):
         device = str(calibrations.device[row])
-        own = [(d.reliable_day - d.day) / MONTH_D for d in units.get(f"{device} {calibrations.unit[row]}", ())]
-        reliable = min(own, default=of_kind.get(device, np.nan))
+        forecasts = [(d.reliable_day - d.day) / MONTH_D for d in units.get(f"{device} {calibrations.unit[row]}", ())]
+        reliable = min(forecasts, default=of_kind.get(device, np.nan))
         if np.isfinite(reliable):
             months[k] = np.clip(np.floor(reliable), rules.shortest_months, rules.longest_months)
             because[k] = "drift"

@@ -42,29 +42,29 @@ def strangers(calibrations: Calibrations, rules: Rules | None = None) -> list[St
     """
     out: list[Stranger] = []
     for device in np.unique(calibrations.device.astype(str)):
-        own = np.flatnonzero(calibrations.device == device)
-        values = _fingerprints(calibrations, own)
-        before = _before(calibrations.histories[own], np.ones(own.size, dtype=bool))
+        rows = np.flatnonzero(calibrations.device == device)
+        values = _fingerprints(calibrations, rows)
+        before = _before(calibrations.histories[rows], np.ones(rows.size, dtype=bool))
         pairs = np.flatnonzero(before >= 0)
         if pairs.size < FEWEST_PAIRS:
-            exchanged = exchanged_pairs(calibrations, own, before, rules) if rules is not None else []
+            exchanged = exchanged_pairs(calibrations, rows, before, rules) if rules is not None else []
             out += [
-                Stranger(int(own[k]), far, str(calibrations.unit[own[other]]), exchanged=True)
+                Stranger(int(rows[k]), far, str(calibrations.unit[rows[other]]), exchanged=True)
                 for k, other, far in exchanged
             ]
             continue
-        years = (calibrations.day[own] - calibrations.day[own][before]) / YEAR_D
+        years = (calibrations.day[rows] - calibrations.day[rows][before]) / YEAR_D
         scale = change_scale(values[pairs], values[before[pairs]], years[pairs], values[before < 0])
         if scale.count == 0:
             continue
-        foreign = _foreign(values, calibrations.histories[own], calibrations.day[own], scale)
-        out += _described(calibrations, own, values, foreign, scale)
+        foreign = _foreign(values, calibrations.histories[rows], calibrations.day[rows], scale)
+        out += _described(calibrations, rows, values, foreign, scale)
     return sorted(out, key=lambda stranger: stranger.row)
 
 
-def _fingerprints(calibrations: Calibrations, own: Index) -> Array:
+def _fingerprints(calibrations: Calibrations, rows: Index) -> Array:
     """Parameters that belong to the unit and that all calibrations of the kind have, (n, p); the others are set to zero."""
-    values = calibrations.values[own].copy()
+    values = calibrations.values[rows].copy()
     values[:, TURNS] = 0.0
     values[:, ~np.isfinite(values).all(axis=0)] = 0.0
     return values
@@ -83,7 +83,7 @@ def _before(histories: Index, good: Flags) -> Index:
 
 
 def _foreign(values: Array, histories: Index, days: Array, scale: ChangeScale) -> Flags:
-    """Which calibrations do not fit the last fitting calibration before them."""
+    """Mask (m,) of the calibrations that do not fit the last fitting calibration before them."""
     foreign = np.zeros(len(values), dtype=bool)
     for _ in range(ROUNDS):
         before = _before(histories, ~foreign)
@@ -100,36 +100,36 @@ def _foreign(values: Array, histories: Index, days: Array, scale: ChangeScale) -
 
 
 def _described(
-    calibrations: Calibrations, own: Index, values: Array, foreign: Flags, scale: ChangeScale
+    calibrations: Calibrations, rows: Index, values: Array, foreign: Flags, scale: ChangeScale
 ) -> list[Stranger]:
-    before = _before(calibrations.histories[own], ~foreign)
-    histories, days = calibrations.histories[own], calibrations.day[own]
+    before = _before(calibrations.histories[rows], ~foreign)
+    histories, days = calibrations.histories[rows], calibrations.day[rows]
     out: list[Stranger] = []
     for k in map(int, np.flatnonzero(foreign)):
         other, unit = _fits(k, values, foreign, histories, days, scale)
-        back = _exchanged(k, unit, values, foreign, histories, days, before, scale) if other >= 0 else False
+        exchanged = _exchanged(k, unit, values, foreign, histories, days, before, scale) if other >= 0 else False
         years = float(days[k] - days[before[k]]) / YEAR_D
         usual = float(np.sqrt(distance(values[k], values[before[k]], scale, years) / scale.count))
-        out.append(Stranger(int(own[k]), usual, str(calibrations.unit[own[other]]) if other >= 0 else "", back))
+        out.append(Stranger(int(rows[k]), usual, str(calibrations.unit[rows[other]]) if other >= 0 else "", exchanged))
     return out
 
 
 def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, scale: ChangeScale) -> tuple[int, int]:
-    """The good earlier calibration of the one other unit whose history it fits, and that unit; (−1, −1) for none or several."""
+    """Nearest earlier good calibration and its unit, where ``k`` fits the history of that unit alone; else (−1, −1)."""
     candidates = np.flatnonzero((days < days[k]) & ~foreign & (histories != histories[k]))
     if not candidates.size:
         return -1, -1
     years = (days[k] - days[candidates]) / YEAR_D
     best, least = nearest(values[k], values[candidates], scale, years)
-    place, unit = int(candidates[best]), int(histories[candidates[best]])
+    index, unit = int(candidates[best]), int(histories[candidates[best]])
     fitting = histories[candidates[distance(values[k], values[candidates], scale, years) <= foreign_above(scale)]]
-    return (place, unit) if least <= alike_below(scale) and np.all(fitting == unit) else (-1, -1)
+    return (index, unit) if least <= alike_below(scale) and np.all(fitting == unit) else (-1, -1)
 
 
 def _exchanged(
     k: int, unit: int, values: Array, foreign: Flags, histories: Index, days: Array, before: Index, scale: ChangeScale
 ) -> bool:
-    """Whether the other unit has a foreign calibration of the same days that fits the history of this one."""
+    """Whether the other unit has a foreign calibration of the same days that fits the history of this unit."""
     near = np.flatnonzero(foreign & (histories == unit) & (np.abs(days - days[k]) <= 1.0))
     years = np.abs(days[near] - days[before[k]]) / YEAR_D
     return bool(np.any(distance(values[near], values[before[k]], scale, years) <= foreign_above(scale)))
@@ -139,7 +139,7 @@ COVERAGE = 2.0
 
 
 def exchanged_pairs(
-    calibrations: Calibrations, own: Index, before: Index, rules: Rules
+    calibrations: Calibrations, rows: Index, before: Index, rules: Rules
 ) -> list[tuple[int, int, float]]:
     """Pairs of calibrations of one run that fit each other's history and not their own; both directions, with the distance.
 
@@ -148,23 +148,23 @@ def exchanged_pairs(
 
     Parameters
     ----------
-    own : rows of one kind of device
+    rows : (m,), calibrations of one kind of device
     before : (m,), index among them of the unit's previous calibration; −1 without one
     """
-    device = str(calibrations.device[own[0]]) if own.size else ""
+    device = str(calibrations.device[rows[0]]) if rows.size else ""
     bound = np.array([rules.tolerance_of(device, FAMILY_OF[name]) for name in NAMES])
-    pairs, past = list[tuple[int, int, float]](), [int(own[place]) for place in before]
-    for run in np.unique(calibrations.run[own[before >= 0]].astype(str)):
-        here = np.flatnonzero((calibrations.run[own] == run) & (before >= 0))
-        far = [int(k) for k in here if not _within(calibrations, own[k], past[k], bound)]
-        apart = {k: (calibrations.values[own[k]] - calibrations.values[past[k]]) / bound for k in far}
+    pairs, past = list[tuple[int, int, float]](), [int(rows[index]) for index in before]
+    for run in np.unique(calibrations.run[rows[before >= 0]].astype(str)):
+        candidates = np.flatnonzero((calibrations.run[rows] == run) & (before >= 0))
+        far = [int(k) for k in candidates if not _within(calibrations, rows[k], past[k], bound)]
+        apart = {k: (calibrations.values[rows[k]] - calibrations.values[past[k]]) / bound for k in far}
         pairs += [
             (k, other, float(np.sqrt(np.nanmean(apart[k][np.isfinite(bound)] ** 2))))
             for k in far
             for other in far
             if k != other
-            and _within(calibrations, own[k], past[other], bound)
-            and _within(calibrations, own[other], past[k], bound)
+            and _within(calibrations, rows[k], past[other], bound)
+            and _within(calibrations, rows[other], past[k], bound)
         ]
     return pairs
 

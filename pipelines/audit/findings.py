@@ -67,36 +67,36 @@ def _broken(folder: str, text: str) -> AuditFinding:
 
 def _held_but_failed(audit: Audit) -> Iterator[AuditFinding]:
     """Units that failed their last measurement and have a valid certificate, by kind of device."""
-    own = audit.due
-    for device, chosen in _by_device(audit, np.flatnonzero(own.valid & (own.because == "did not pass"))):
-        units, certificates = _units(audit, chosen), tuple(str(one) for one in own.certificate[chosen])
+    due_units = audit.due
+    for device, chosen in _by_device(audit, np.flatnonzero(due_units.valid & (due_units.because == "did not pass"))):
+        units, certificates = _units(audit, chosen), tuple(str(number) for number in due_units.certificate[chosen])
         message = (
             f"{device}: {number_of(len(units), 'unit')} with a valid certificate did not pass the last measurement; "
             "revoke each certificate from the first doubtful day, and measure the unit again "
             f"({some(certificates)})"
         )
-        runs = [str(run) for run in audit.all.run[own.row[chosen]]]
+        runs = [str(run) for run in audit.all.run[due_units.row[chosen]]]
         evidence = {"certificates": list(certificates), "runs": runs}
         yield AuditFinding("quality", "held_but_failed", device, message, units, evidence)
 
 
 def _uncertified(audit: Audit) -> Iterator[AuditFinding]:
     """Units that passed without a certificate for it, by kind of device; none in an archive without a ledger."""
-    for device, own in _by_device(audit, uncertified(audit.all, audit.due, audit.certificates)):
-        units = _units(audit, own)
-        without = int(np.count_nonzero(~audit.due.valid[own]))
+    for device, chosen in _by_device(audit, uncertified(audit.all, audit.due, audit.certificates)):
+        units = _units(audit, chosen)
+        without = int(np.count_nonzero(~audit.due.valid[chosen]))
         message = (
             f"{device}: {number_of(len(units), 'unit')} passed the last measurement without a certificate for it, {without} "
             f"without any valid certificate; certify their runs, or record the reason ({some(units)})"
         )
-        runs = sorted({str(run) for run in audit.all.run[audit.due.row[own]]})
+        runs = sorted({str(run) for run in audit.all.run[audit.due.row[chosen]]})
         yield AuditFinding("quality", "uncertified", device, message, units, {"without": without, "runs": runs})
 
 
 def _overdue(audit: Audit) -> Iterator[AuditFinding]:
-    for device, own in _by_device(audit, audit.overdue):
-        units, oldest = _units(audit, own), date_of(float(audit.due.day[own].min()))
-        all_counts = {why: int(np.count_nonzero(audit.due.because[own] == why)) for why in REASONS}
+    for device, chosen in _by_device(audit, audit.overdue):
+        units, oldest = _units(audit, chosen), date_of(float(audit.due.day[chosen].min()))
+        all_counts = {why: int(np.count_nonzero(audit.due.because[chosen] == why)) for why in REASONS}
         counts = {why: count for why, count in all_counts.items() if count}
         because = ", ".join(f"{count} because {REASONS[why]}" for why, count in counts.items())
         message = (
@@ -107,8 +107,8 @@ def _overdue(audit: Audit) -> Iterator[AuditFinding]:
 
 
 def _coming_due(audit: Audit) -> Iterator[AuditFinding]:
-    for device, own in _by_device(audit, audit.coming_due):
-        units = _units(audit, own)
+    for device, chosen in _by_device(audit, audit.coming_due):
+        units = _units(audit, chosen)
         message = (
             f"{device}: {number_of(len(units), 'unit')} due within {audit.rules.notice_days} days; "
             f"schedule the calibration ({some(units)})"
@@ -123,8 +123,8 @@ def _by_device(audit: Audit, chosen: Index) -> Iterator[tuple[str, Index]]:
         yield str(device), chosen[devices == device]
 
 
-def _units(audit: Audit, own: Index) -> tuple[str, ...]:
-    return tuple(str(unit) for unit in audit.all.unit[audit.due.row[own]])
+def _units(audit: Audit, chosen: Index) -> tuple[str, ...]:
+    return tuple(str(unit) for unit in audit.all.unit[audit.due.row[chosen]])
 
 
 def _odd(audit: Audit) -> Iterator[AuditFinding]:

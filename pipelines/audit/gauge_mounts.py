@@ -7,7 +7,7 @@ import numpy as np
 from inertial.arrays import Flags, Index
 from inertial.population.gauge import Gauge, gauge_study
 from pipelines.audit.calibrations import Calibrations
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.pairs import first_of_each
 from pipelines.audit.parameters import FAMILY_OF
 from pipelines.audit.rules import Rules
@@ -41,7 +41,7 @@ def studies(calibrations: Calibrations, good: Flags, rules: Rules) -> list[Study
         device = str(calibrations.device[rows[0, 0, 0]])
         days = calibrations.day[rows]
         runs = tuple(sorted({str(run) for run in calibrations.run[rows].ravel()}))
-        for name in OWN:
+        for name in OF_UNIT:
             values = calibrations.column(name)[rows]
             if np.isfinite(values).all():
                 components = gauge_study(values)
@@ -56,20 +56,20 @@ def _groups(calibrations: Calibrations, good: Flags, within_days: float) -> list
     order = rows[np.lexsort((calibrations.unit[rows].astype(str), calibrations.run[rows].astype(str)))]
     starts = first_of_each(calibrations.run[order].astype(str))
     by_units: dict[tuple[str, ...], list[Index]] = {}
-    for own in np.split(order, starts[1:]):
-        if own.size >= FEWEST_PARTS:
-            by_units.setdefault(tuple(calibrations.unit[own]), []).append(own)
+    for of_run in np.split(order, starts[1:]):
+        if of_run.size >= FEWEST_PARTS:
+            by_units.setdefault(tuple(calibrations.unit[of_run]), []).append(of_run)
     out: list[dict[str, Index]] = []
     for members in by_units.values():
-        members.sort(key=lambda own: (float(calibrations.day[own[0]]), str(calibrations.run[own[0]])))
+        members.sort(key=lambda of_run: (float(calibrations.day[of_run[0]]), str(calibrations.run[of_run[0]])))
         part: list[Index] = []
-        for own in [*members, None]:
-            if part and (own is None or calibrations.day[own[0]] - calibrations.day[part[0][0]] > within_days):
+        for of_run in [*members, None]:
+            if part and (of_run is None or calibrations.day[of_run[0]] - calibrations.day[part[0][0]] > within_days):
                 if len(part) > 1:
-                    out.append({str(calibrations.run[one[0]]): one for one in part})
+                    out.append({str(calibrations.run[mounting[0]]): mounting for mounting in part})
                 part = []
-            if own is not None:
-                part.append(own)
+            if of_run is not None:
+                part.append(of_run)
     return out
 
 

@@ -48,12 +48,12 @@ READERS = 4
 class Portion(NamedTuple):
     """Work for one process: a part of the index for these runs.
 
-    archive : its address; place : folder of the index outside the archive; empty: in the archive
+    archive : its address; folder : of an index outside the archive; empty: in the archive
     runs : with their stamps; version : of the code that makes the rows
     """
 
     archive: str
-    place: str
+    folder: str
     runs: tuple[tuple[str, str], ...]
     version: str
 
@@ -69,9 +69,9 @@ class _Fleeting:
 class _Reading:
     """A shared lock: parts of the folder are not removed while a process holds it; it is released when the process dies."""
 
-    def __init__(self, place: Path) -> None:
+    def __init__(self, folder: Path) -> None:
         with suppress(OSError):  # a file system without locks, a system that opens no folders
-            handle = os.open(place, os.O_RDONLY)
+            handle = os.open(folder, os.O_RDONLY)
             finalize(self, os.close, handle)
             host.lock(handle, host.SHARED)
 
@@ -121,13 +121,13 @@ def up_to_date(archive: Archive, distribute: Distributor | None = None, workers:
     ----------
     distribute, workers : where parts are made, see :func:`pipelines.parallel.map_partitions`
     """
-    place = archive.root / FOLDER
+    folder = archive.root / FOLDER
     if not (archive.root / "runs").is_dir():  # a mistyped address must not become a folder
         return AuditIndex((), 0, 0)
     try:
-        with alone(place, wait=True):
-            index = _refreshed(archive, place, distribute, workers)
-            return replace(index, holder=_Reading(place)) if isinstance(place, Path) else index
+        with alone(folder, wait=True):
+            index = _refreshed(archive, folder, distribute, workers)
+            return replace(index, holder=_Reading(folder)) if isinstance(folder, Path) else index
     except ArchiveUnusable:
         if isinstance(archive.root, Path) and os.access(archive.root, os.W_OK):
             raise
@@ -135,30 +135,30 @@ def up_to_date(archive: Archive, distribute: Distributor | None = None, workers:
         return replace(_refreshed(archive, holder.path, distribute, workers), holder=holder)
 
 
-def _refreshed(archive: Archive, place: Place, distribute: Distributor | None, workers: int) -> AuditIndex:
+def _refreshed(archive: Archive, folder: Place, distribute: Distributor | None, workers: int) -> AuditIndex:
     stamps, version = stamps_of(archive.root), version_of_rows()
-    parts = _believed(part_folders(place), version)
-    remove_parts(place, [part for part, runs in parts.items() if not runs])  # a new part may have its name
+    parts = _believed(part_folders(folder), version)
+    remove_parts(folder, [part for part, runs in parts.items() if not runs])  # a new part may have its name
     good = _without_doubles({part: runs for part, runs in parts.items() if runs and runs.items() <= stamps.items()})
     small = [part for part, runs in good.items() if len(runs) < RUNS_PER_PART // 2]
     if len(small) > MOST_SMALL:
         good = {part: runs for part, runs in good.items() if part not in small}
-    there = {run for runs in good.values() for run in runs}
-    missing = in_order_of_disk(archive.root, list(stamps.keys() - there))
+    indexed = {run for runs in good.values() for run in runs}
+    missing = in_order_of_disk(archive.root, list(stamps.keys() - indexed))
     chunks = [missing[k : k + RUNS_PER_PART] for k in range(0, len(missing), RUNS_PER_PART)]
     root = address_of(archive.root)
-    own = "" if place == archive.root / FOLDER else str(place)
-    portions = [Portion(root, own, tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
+    elsewhere = "" if folder == archive.root / FOLDER else str(folder)
+    portions = [Portion(root, elsewhere, tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
     names = map_partitions(make_part, portions, distribute, workers=workers, name="audit index")
-    new = [place / name for name in names]
-    remove_parts(place, set(parts) - set(good) - set(new))
-    return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
+    new = [folder / name for name in names]
+    remove_parts(folder, set(parts) - set(good) - set(new))
+    return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(indexed))
 
 
 def make_part(portion: Portion) -> str:
     """Make and publish a part of the index from the files of its runs; return its name."""
     root = Archive(portion.archive).root
-    runs, place = root / "runs", Path(portion.place) if portion.place else root / FOLDER
+    runs, folder = root / "runs", Path(portion.folder) if portion.folder else root / FOLDER
     tables = rows_of_runs(read_runs(runs, portion.runs))
     # ``runs`` last: it shows that all others exist
     content = {f"{name}.parquet": _encoded(tables[name], portion.version) for name in reversed(TABLES)}
@@ -166,7 +166,7 @@ def make_part(portion: Portion) -> str:
     content = {SEAL: files.json_bytes(derived.seal(hashes)), **content}
     text = "\n".join([portion.version, *(f"{run} {stamp}" for run, stamp in portion.runs)])
     name = hashlib.sha256(text.encode()).hexdigest()[:16]
-    files.publish_folder(place / name, content)
+    files.publish_folder(folder / name, content)
     return name
 
 
@@ -208,11 +208,11 @@ def standing_of(part: Place) -> str:
     return derived.standing(seal, hashes)
 
 
-def part_folders(place: Place) -> list[Place]:
+def part_folders(folder: Place) -> list[Place]:
     """Folders of an index with the name of a part."""
-    if not place.is_dir():
+    if not folder.is_dir():
         return []
-    return sorted((part for part in place.iterdir() if NAME.fullmatch(part.name)), key=str)
+    return sorted((part for part in folder.iterdir() if NAME.fullmatch(part.name)), key=str)
 
 
 def runs_of(part: Place, version: str) -> dict[str, str]:
@@ -231,27 +231,27 @@ def runs_of(part: Place, version: str) -> dict[str, str]:
 def _without_doubles(parts: Mapping[Place, dict[str, str]]) -> dict[Place, dict[str, str]]:
     """The parts without those with a run that another part already has."""
     seen: set[str] = set()
-    kept: dict[Place, dict[str, str]] = {}
+    distinct: dict[Place, dict[str, str]] = {}
     for part, runs in sorted(parts.items(), key=lambda item: (-len(item[1]), str(item[0]))):
         if not seen & runs.keys():
             seen |= runs.keys()
-            kept[part] = runs
-    return kept
+            distinct[part] = runs
+    return distinct
 
 
 def _opened(file: Place) -> pa.BufferReader | str:
     return pa.BufferReader(file.read_bytes()) if isinstance(file, ObjectPath) else str(file)
 
 
-def remove_parts(place: Place, parts: Collection[Place]) -> None:
+def remove_parts(folder: Place, parts: Collection[Place]) -> None:
     """Remove obsolete parts, unless another process may still read them; then a later update removes them."""
-    if isinstance(place, ObjectPath):
+    if isinstance(folder, ObjectPath):
         for part in parts:
-            (place / part.name).remove_all()
+            (folder / part.name).remove_all()
         return
-    with files.writers_of(place, host.EXCLUSIVE | host.AT_ONCE) if parts else nullcontext(enter_result=False) as mine:
+    with files.writers_of(folder, host.EXCLUSIVE | host.AT_ONCE) if parts else nullcontext(enter_result=False) as mine:
         for part in parts if mine else ():
-            shutil.rmtree(place / part.name, ignore_errors=True)
+            shutil.rmtree(folder / part.name, ignore_errors=True)
 
 
 def check_index(archive: Archive, checked: VerifiedPart) -> None:
@@ -273,11 +273,11 @@ def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], chec
     expected = rows_of_runs(read_runs(archive.root / "runs", runs))
     chosen = [run for run, _ in runs]
     for name in TABLES:
-        place = part / f"{name}.parquet"
-        table = pq.read_table(_opened(place))
+        path = part / f"{name}.parquet"
+        table = pq.read_table(_opened(path))
         actual = table.filter(pc.field("run").isin(pa.array(chosen, pa.string())))
         if not _same(actual, expected[name], SCHEMAS[name]):
-            checked.wrong(CHANGED, place, f"has other rows than the runs that it was made from: {REMEDY}")
+            checked.wrong(CHANGED, path, f"has other rows than the runs that it was made from: {REMEDY}")
 
 
 def _same(actual: pa.Table, expected: pa.Table, schema: pa.Schema) -> bool:

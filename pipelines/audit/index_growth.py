@@ -35,15 +35,15 @@ def add_runs(archive: Archive, runs: Sequence[str]) -> int:
 
 
 def _added(archive: Archive, root: Path, runs: Sequence[str]) -> int:
-    place, version = root / FOLDER, index.version_of_rows()
-    with alone(place, wait=True):
-        small = [part for part in index.part_folders(place) if _rows(part) < RUNS_PER_PART // 2]
+    folder, version = root / FOLDER, index.version_of_rows()
+    with alone(folder, wait=True):
+        small = [part for part in index.part_folders(folder) if _rows(part) < RUNS_PER_PART // 2]
         merged = small if len(small) >= MOST_SMALL else []
         before = {run for part in merged for run in index.runs_of(part, version)}
         stamps = stamps_among(root, sorted({*before, *runs}))
         portion = Portion(address_of(archive.root), "", tuple(stamps.items()), version)
         new = index.make_part(portion)
-        index.remove_parts(place, [part for part in merged if part.name != new])
+        index.remove_parts(folder, [part for part in merged if part.name != new])
     return len(portion.runs)
 
 

@@ -36,8 +36,8 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         overdue=audit.overdue.size,
         valid=int(audit.due.valid.sum()),
         rules=audit.rules,
-        series_svg="".join(still(svg_text(drawn.series_chart(one))) for one in series),
-        charts_svg="".join(still(svg_text(drawn.control_chart(one))) for one in charts),
+        series_svg="".join(still(svg_text(drawn.series_chart(course))) for course in series),
+        charts_svg="".join(still(svg_text(drawn.control_chart(chart))) for chart in charts),
         chart_count=len(audit.charts),
         yield_svg=still(svg_text(drawn.yield_chart(months))) if len(months) > 1 else "",
         due_svg=still(svg_text(drawn.due_chart(audit))) if audit.due.row.size else "",
@@ -69,32 +69,32 @@ def _groups(listed: list[AuditFinding]) -> list[dict[str, Any]]:
     """Findings by role; the first of each kind are shown, the others counted."""
     out: list[dict[str, Any]] = []
     for who, role in WHO.items():
-        own = [finding for finding in listed if finding.who == who]
+        of_role = [finding for finding in listed if finding.who == who]
         shown: list[AuditFinding] = []
         more: dict[str, int] = {}
-        for finding in own:
-            if sum(one.kind == finding.kind for one in shown) < MOST_OF_KIND:
+        for finding in of_role:
+            if sum(earlier.kind == finding.kind for earlier in shown) < MOST_OF_KIND:
                 shown.append(finding)
             else:
                 more[finding.kind] = more.get(finding.kind, 0) + 1
-        if own:
-            out.append({"who": role, "findings": shown, "more": more, "count": len(own)})
+        if of_role:
+            out.append({"who": role, "findings": shown, "more": more, "count": len(of_role)})
     return out
 
 
 def _telling_series(audit: Audit) -> list[StationSeries]:
     """The series with a change of level, most significant first and each event once; without one the levels of the stations."""
-    moved = [one for one in (*audit.stations, *audit.slots) if one.changes]
+    moved = [series for series in (*audit.stations, *audit.slots) if series.changes]
     events: list[tuple[str, bool, float]] = []
-    kept: list[StationSeries] = []
-    for one in sorted(moved, key=lambda s: -max(c.significance for c in s.changes)):
-        plainest = max(one.changes, key=lambda c: c.significance)
-        event = (one.station, one.where.startswith("slot"), float(one.day[plainest.first]))
+    telling: list[StationSeries] = []
+    for series in sorted(moved, key=lambda s: -max(c.significance for c in s.changes)):
+        plainest = max(series.changes, key=lambda c: c.significance)
+        event = (series.station, series.where.startswith("slot"), float(series.day[plainest.first]))
         if not any(event[:2] == known[:2] and abs(event[2] - known[2]) < SAME_EVENT_D for known in events):
             events.append(event)
-            kept.append(one)
-    if kept:
-        return kept[:MOST_SERIES]
+            telling.append(series)
+    if telling:
+        return telling[:MOST_SERIES]
     return [station for station in audit.stations if station.where == "level_error"][:MOST_SERIES]
 
 

@@ -31,8 +31,8 @@ class Pairs:
 def pairs_of(calibrations: Calibrations, good: Flags) -> Pairs:
     """Every good calibration with the previous good one of the same unit."""
     rows = np.flatnonzero(good)
-    same = calibrations.histories[rows[1:]] == calibrations.histories[rows[:-1]]
-    return _pairs(calibrations, rows[1:][same], rows[:-1][same])
+    same_unit = calibrations.histories[rows[1:]] == calibrations.histories[rows[:-1]]
+    return _pairs(calibrations, rows[1:][same_unit], rows[:-1][same_unit])
 
 
 def _pairs(calibrations: Calibrations, later: Index, earlier: Index) -> Pairs:

@@ -15,11 +15,11 @@ from schemas.units import AXES
 
 
 class Family(NamedTuple):
-    """Parameters of one kind: their unit, and the coefficient they are computed from; ``own`` where they belong to the unit."""
+    """Parameters of one kind and their unit of measure; ``of_unit``: they belong to the unit, not to its mounting."""
 
     unit: str
     names: tuple[str, ...]
-    own: bool
+    of_unit: bool
 
 
 def _along(name: str) -> tuple[str, ...]:
@@ -27,12 +27,12 @@ def _along(name: str) -> tuple[str, ...]:
 
 
 FAMILIES: Mapping[str, Family] = {
-    "bias": Family("µg", _along("bias"), own=True),
-    "scale": Family("ppm", _along("scale"), own=True),
-    "square": Family("mrad", ("square_yz", "square_zx", "square_xy"), own=True),
-    "rotation": Family("mrad", _along("rotation"), own=False),
-    "bias_temperature": Family("µg/K", _along("bias_temperature"), own=True),
-    "scale_temperature": Family("ppm/K", _along("scale_temperature"), own=True),
+    "bias": Family("µg", _along("bias"), of_unit=True),
+    "scale": Family("ppm", _along("scale"), of_unit=True),
+    "square": Family("mrad", ("square_yz", "square_zx", "square_xy"), of_unit=True),
+    "rotation": Family("mrad", _along("rotation"), of_unit=False),
+    "bias_temperature": Family("µg/K", _along("bias_temperature"), of_unit=True),
+    "scale_temperature": Family("ppm/K", _along("scale_temperature"), of_unit=True),
 }
 NAMES: tuple[str, ...] = tuple(name for family in FAMILIES.values() for name in family.names)
 FAMILY_OF = {name: family for family, content in FAMILIES.items() for name in content.names}
@@ -76,10 +76,10 @@ def parameters_of(
         columns = zip(texts.values(), words, strict=True)
         if not all(word in known for (known, _), word in columns):
             return nothing, nothing
-        places = [numbers == known.index(word) for (known, numbers), word in zip(texts.values(), words, strict=True)]
-        own = np.flatnonzero(places[0] & places[1] & places[2])
+        masks = [numbers == known.index(word) for (known, numbers), word in zip(texts.values(), words, strict=True)]
+        chosen = np.flatnonzero(masks[0] & masks[1] & masks[2])
         value_and_error = nothing.copy(), nothing.copy()
-        value_and_error[0][row[own]], value_and_error[1][row[own]] = value[own], error[own]
+        value_and_error[0][row[chosen]], value_and_error[1][row[chosen]] = value[chosen], error[chosen]
         return value_and_error
 
     scale = [pick("scale", "K1", axis) for axis in AXES]

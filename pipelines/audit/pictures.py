@@ -8,7 +8,7 @@ import numpy as np
 
 from inertial.counts import number_of
 from pipelines.audit.audit import Audit
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.finding import AuditFinding
 from pipelines.audit.pairs import YEAR_D
 from pipelines.audit.parameters import NAMES, parameter_text, unit_text
@@ -68,8 +68,8 @@ def control_chart(chart: ControlChart) -> Chart:
     traces.append(Trace("moving average", chart.day, chart.average, "line", "before"))
     texts = np.array([f"{run}: {value:.5g}" for run, value in zip(chart.run, chart.value, strict=True)], dtype=object)
     for rows, (name, role, symbol, size) in zip((~chart.hit, chart.hit), SIGNALS, strict=True):
-        told = tuple(texts[rows])
-        traces.append(Trace(name, chart.day[rows], chart.value[rows], "points", role, symbol, size, texts=told))
+        labels = tuple(texts[rows])
+        traces.append(Trace(name, chart.day[rows], chart.value[rows], "points", role, symbol, size, texts=labels))
     alarms = f"{number_of(chart.alarms, 'alarm')}, {chart.expected:.1f} expected by chance"
     name = parameter_text(chart.parameter)
     title = f"{chart.station}: {chart.standard}, {name}: {alarms}"
@@ -137,16 +137,18 @@ def evidence_chart(audit: Audit, finding: AuditFinding) -> Chart | None:
     numbers = finding.evidence
     parameter = str(numbers.get("parameter", ""))
     if finding.who == "station" and "where" in numbers:
-        same = (str(numbers["station"]), str(numbers["where"]), parameter)
-        series = (one for one in (*audit.stations, *audit.slots) if (one.station, one.where, one.parameter) == same)
-        return next((series_chart(one) for one in series), None)
+        key = (str(numbers["station"]), str(numbers["where"]), parameter)
+        series = (s for s in (*audit.stations, *audit.slots) if (s.station, s.where, s.parameter) == key)
+        return next((series_chart(s) for s in series), None)
     if "standard" in numbers:
-        same = (str(numbers["station"]), str(numbers["standard"]), parameter)
-        charts = (chart for chart in audit.charts if (chart.station, chart.standard, chart.parameter) == same)
-        return next((control_chart(one) for one in charts), None)
+        key = (str(numbers["station"]), str(numbers["standard"]), parameter)
+        charts = (chart for chart in audit.charts if (chart.station, chart.standard, chart.parameter) == key)
+        return next((control_chart(chart) for chart in charts), None)
     if not finding.units or len(finding.units) > len(UNIT_ROLES) or "run" not in numbers:
         return None
-    drifts = [d for own in audit.units.values() for d in own if d.unit == finding.units[0] and d.parameter == parameter]
+    drifts = [
+        d for unit in audit.units.values() for d in unit if (d.unit, d.parameter) == (finding.units[0], parameter)
+    ]
     if drifts:
         return drift_chart(audit, drifts[0])
     return _histories(audit, finding.units, parameter or _furthest(audit, finding.units), str(numbers["run"]))
@@ -155,25 +157,28 @@ def evidence_chart(audit: Audit, finding: AuditFinding) -> Chart | None:
 def _furthest(audit: Audit, units: Sequence[str]) -> str:
     """The parameter in which a unit's calibrations are most scattered relative to their errors."""
     rows = audit.all.unit == units[0]
-    own = [NAMES.index(name) for name in OWN]
-    values, errors = audit.all.values[rows][:, own], audit.all.errors[rows][:, own]
+    columns = [NAMES.index(name) for name in OF_UNIT]
+    values, errors = audit.all.values[rows][:, columns], audit.all.errors[rows][:, columns]
     spread = np.nan_to_num(np.ptp(values, axis=0) / np.nanmax(errors, axis=0))
-    return OWN[int(np.argmax(spread))]
+    return OF_UNIT[int(np.argmax(spread))]
 
 
 def _histories(audit: Audit, units: Sequence[str], parameter: str, run: str) -> Chart:
     """Calibrations of one or two units before all others of their kind, with those of the run of the finding marked."""
-    own = audit.all
-    value, error, text = own.column(parameter), 2.0 * own.error(parameter), unit_text(parameter)
-    kind = own.device == own.device[own.unit == units[0]][0]
-    others, marked = kind & ~np.isin(own.unit, units), np.isin(own.unit, units) & (own.run == run)
-    traces = [Trace("other units of the kind", own.day[others], value[others], role="muted", size=3.5)]
+    calibrations = audit.all
+    value, error, text = calibrations.column(parameter), 2.0 * calibrations.error(parameter), unit_text(parameter)
+    kind = calibrations.device == calibrations.device[calibrations.unit == units[0]][0]
+    shown_units = np.isin(calibrations.unit, units)
+    others, marked = kind & ~shown_units, shown_units & (calibrations.run == run)
+    traces = [Trace("other units of the kind", calibrations.day[others], value[others], role="muted", size=3.5)]
     for name, role in zip(units, UNIT_ROLES, strict=False):
-        rows = np.flatnonzero((own.unit == name) & kind)
-        day, shown = own.day[rows], value[rows]
-        texts = tuple(f"{name}, run {own.run[row]}: {value[row]:.5g} {text}" for row in rows)
+        rows = np.flatnonzero((calibrations.unit == name) & kind)
+        day, shown = calibrations.day[rows], value[rows]
+        texts = tuple(f"{name}, run {calibrations.run[row]}: {value[row]:.5g} {text}" for row in rows)
         traces.append(Trace(f"{name} line", day, shown, "line", role, legend=False))
         traces.append(Trace(name, day, shown, role=role, size=7.0, error=error[rows], texts=texts))
-    traces.append(Trace(f"run {run}", own.day[marked], value[marked], role="limit", symbol="diamond", size=11.0))
+    traces.append(
+        Trace(f"run {run}", calibrations.day[marked], value[marked], role="limit", symbol="diamond", size=11.0)
+    )
     plot = Plot("", PlotAxis("date of measurement", dates=True), PlotAxis(f"{parameter} / {text}"), tuple(traces))
     return Chart(f"{parameter} of {' and '.join(units)}, k = 2", (plot,), height=280)

@@ -12,7 +12,7 @@ from inertial.population.comparison import Comparison, compare, holm, outlier_li
 from inertial.population.memory import TO_SIGMA
 from inertial.population.two_way import group_medians
 from pipelines.audit.calibrations import Calibrations, codes, date_of
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.index import AuditIndex
 from pipelines.audit.pairs import first_of_each
 
@@ -38,7 +38,7 @@ def yields(calibrations: Calibrations, chosen: Flags) -> list[Share]:
     passed = calibrations.outcome[rows] == "pass"
     months = np.array([date_of(day)[:7] for day in calibrations.day[rows]], dtype=object)
     out: list[Share] = []
-    for of, names in (
+    for grouping, names in (
         ("all", np.full(rows.size, "all", dtype=object)),
         ("device", calibrations.device[rows]),
         ("station", calibrations.station[rows]),
@@ -47,7 +47,7 @@ def yields(calibrations: Calibrations, chosen: Flags) -> list[Share]:
         kinds, number = np.unique(names.astype(str), return_inverse=True)
         totals, good = np.bincount(number, minlength=kinds.size), np.bincount(number, passed, minlength=kinds.size)
         out += [
-            Share(of, str(n), int(g), int(t), fraction_interval(int(g), int(t)))
+            Share(grouping, str(n), int(g), int(t), fraction_interval(int(g), int(t)))
             for n, g, t in zip(kinds, good, totals, strict=True)
         ]
     return out
@@ -120,14 +120,14 @@ def abilities(calibrations: Calibrations, figures: Figures) -> tuple[list[Abilit
     able, differences = list[Ability](), list[Difference]()
     for kind in np.unique(device):
         for name in np.unique(figures.figure[device == kind].astype(str)):
-            own = np.flatnonzero((device == kind) & (figures.figure == name) & np.isfinite(figures.value))
-            if own.size < FEWEST or np.ptp(figures.value[own]) == 0.0:
+            rows = np.flatnonzero((device == kind) & (figures.figure == name) & np.isfinite(figures.value))
+            if rows.size < FEWEST or np.ptp(figures.value[rows]) == 0.0:
                 continue
-            limit = figures.limit[own]
+            limit = figures.limit[rows]
             if np.isfinite(limit).any():
-                able.append(_ability(kind, name, figures, own[np.isfinite(limit)], lot))
+                able.append(_ability(kind, name, figures, rows[np.isfinite(limit)], lot))
             for by, numbers in groups.items():
-                comparison = _compared(figures.value[own], numbers[own] - numbers[own].min(), lot[own], by)
+                comparison = _compared(figures.value[rows], numbers[rows] - numbers[rows].min(), lot[rows], by)
                 if comparison is not None:
                     differences.append(Difference(kind, name, by, comparison, comparison.rank_p))
     adjusted = holm(np.array([d.p for d in differences])) if differences else []
@@ -151,19 +151,19 @@ def _first_of_each(calibrations: Calibrations, figures: Figures) -> Figures:
     return Figures(*(getattr(figures, name)[first] for name in Figures.__dataclass_fields__))
 
 
-def _ability(device: str, figure: str, figures: Figures, own: Index, lot: Index) -> Ability:
-    values, limit = figures.value[own], float(np.median(figures.limit[own]))
+def _ability(device: str, figure: str, figures: Figures, rows: Index, lot: Index) -> Ability:
+    values, limit = figures.value[rows], float(np.median(figures.limit[rows]))
     two_sided = bool((values < 0.0).any())
     low = -limit if two_sided else -np.inf
     mean, sigma = float(values.mean()), float(values.std(ddof=1))
-    within, dof = sigma_within(values, lot[own])
+    within, dof = sigma_within(values, lot[rows])
     shape = (0.0, 3.0) if two_sided else shape_of(values)
-    outside = int(np.count_nonzero(np.abs(values) > figures.limit[own]))
+    outside = int(np.count_nonzero(np.abs(values) > figures.limit[rows]))
     return Ability(
-        device, figure, str(figures.unit_text[own[0]]), limit, two_sided, own.size, float(np.median(values)),
-        cpk(mean, sigma, low, limit, *independent(values, lot[own]), shape),
+        device, figure, str(figures.unit_text[rows[0]]), limit, two_sided, rows.size, float(np.median(values)),
+        cpk(mean, sigma, low, limit, *independent(values, lot[rows]), shape),
         cpk(mean, within, low, limit, dof + 1, None, shape) if dof >= FEWEST and within > 0.0 else None,
-        fraction_interval(outside, own.size),
+        fraction_interval(outside, rows.size),
     )  # fmt: skip
 
 
@@ -193,7 +193,7 @@ def odd_ones(calibrations: Calibrations, chosen: Flags) -> list[Odd]:
     out: list[Odd] = []
     for device in np.unique(calibrations.device.astype(str)):
         rows = first[calibrations.device[first] == device]
-        values = np.stack([calibrations.column(name)[rows] for name in OWN], axis=1)
+        values = np.stack([calibrations.column(name)[rows] for name in OF_UNIT], axis=1)
         usable = np.isfinite(values).any(axis=0)
         if rows.size < FEWEST or not usable.any():
             continue
@@ -206,14 +206,14 @@ def _odd_units(calibrations: Calibrations, device: str, rows: Index, values: Arr
     z = np.nan_to_num(robust_z(values))
     return [
         Odd("unit", str(calibrations.unit[row]), device, str(calibrations.station[row]), str(calibrations.run[row]),
-            float(calibrations.day[row]), OWN[column], float(values[k, column]), float(z[k, column]), 1)
+            float(calibrations.day[row]), OF_UNIT[column], float(values[k, column]), float(z[k, column]), 1)
         for k, column in _outliers(z)
         if str(calibrations.run[row := rows[k]]) not in odd_lots
     ]  # fmt: skip
 
 
 def _outliers(z: Array) -> list[tuple[int, int]]:
-    """Rows of distances in σ (n, p) whose largest one is an outlier, with its column."""
+    """Rows of distances in σ (n, p) whose largest entry is an outlier, with its column."""
     worst = np.argmax(np.abs(z), axis=1)
     size = np.abs(z[np.arange(len(z)), worst])
     return [(int(k), int(worst[k])) for k in np.flatnonzero(size > outlier_limit(z.size, len(z)))]
@@ -242,7 +242,7 @@ def _odd_lots(calibrations: Calibrations, device: str, rows: Index, values: Arra
         run = str(runs[large[k]])
         row = rows[np.flatnonzero(lot == large[k])[0]]
         out.append(
-            Odd("lot", run, device, str(calibrations.station[row]), run, float(calibrations.day[row]), OWN[column],
+            Odd("lot", run, device, str(calibrations.station[row]), run, float(calibrations.day[row]), OF_UNIT[column],
                 float(means[k, column]), float(z[k, column]), int(counts[large[k]]))
         )  # fmt: skip
     return out

@@ -28,9 +28,9 @@ class Tolerance(Strict):
 
 def _checked(tolerances: dict[str, Tolerance]) -> dict[str, Tolerance]:
     for name, tolerance in tolerances.items():
-        if name not in FAMILIES or not FAMILIES[name].own:
-            own = [family for family, content in FAMILIES.items() if content.own]
-            raise ValueError(f"unknown parameter '{name}'; {did_you_mean(name, own)}")
+        if name not in FAMILIES or not FAMILIES[name].of_unit:
+            families = [family for family, content in FAMILIES.items() if content.of_unit]
+            raise ValueError(f"unknown parameter '{name}'; {did_you_mean(name, families)}")
         if tolerance.unit != FAMILIES[name].unit:
             raise ValueError(
                 f"tolerance.{name}: found {tolerance.unit}, the parameter is in {FAMILIES[name].unit}; give it in that"
@@ -75,8 +75,8 @@ class Rules(Strict):
 
     def months(self, device: str) -> int:
         """The fixed interval of a kind of device."""
-        own = self._kind(device).interval_months
-        return own if own is not None else self.interval_months
+        of_kind = self._kind(device).interval_months
+        return of_kind if of_kind is not None else self.interval_months
 
     def tolerance_of(self, device: str, family: str) -> float:
         """The tolerance of a family of parameters of a kind of device; infinite without one."""
@@ -96,17 +96,17 @@ def load_rules(path: Path | None = None) -> Rules:
     content = tomllib.loads((files("pipelines.audit") / "default.toml").read_text(encoding="utf-8"))
     if path is None:
         return Rules.model_validate(content)
-    own = parse_toml(read_text(path, "rules"), f"rules {path.name}")
+    changes = parse_toml(read_text(path, "rules"), f"rules {path.name}")
     try:
-        return Rules.model_validate(_over(content, own))
+        return Rules.model_validate(_over(content, changes))
     except ValidationError as problem:
         raise explain(problem, f"rules {path.name}", Rules) from None
 
 
-def _over(content: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+def _over(content: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """Tables merged key by key; later values replace earlier ones."""
     out = dict(content)
-    for key, value in own.items():
-        both = isinstance(value, dict) and isinstance(out.get(key), dict) and set(value) != {"max", "unit"}
-        out[key] = _over(out[key], value) if both else value
+    for key, value in changes.items():
+        tables = isinstance(value, dict) and isinstance(out.get(key), dict) and set(value) != {"max", "unit"}
+        out[key] = _over(out[key], value) if tables else value
     return out

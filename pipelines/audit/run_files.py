@@ -44,7 +44,7 @@ def read_runs(runs: Place, stamps: Sequence[tuple[str, str]]) -> Iterator[RunFil
     stamps : names of runs, each with its stamp
     """
     with ThreadPoolExecutor(READERS) as pool:
-        yield from pool.map(lambda one: _read(runs / one[0], one[1]), stamps)
+        yield from pool.map(lambda entry: _read(runs / entry[0], entry[1]), stamps)
 
 
 def stamps_of(root: Place) -> dict[str, str]:
@@ -66,11 +66,11 @@ def stamps_of(root: Place) -> dict[str, str]:
 
 def in_order_of_disk(root: Place, runs: Sequence[str]) -> list[str]:
     """Runs in the order in which their files lie: those of the packs by pack, then the others by name."""
-    place: dict[str, int] = {}
+    position: dict[str, int] = {}
     for contents in root.known.contents("runs") if isinstance(root, PackedPath) else ():
         for folder in contents.names():
-            place[folder.partition("/")[2]] = len(place)
-    return sorted(runs, key=lambda run: (place.get(run, len(place)), run))
+            position[folder.partition("/")[2]] = len(position)
+    return sorted(runs, key=lambda run: (position.get(run, len(position)), run))
 
 
 def stamps_among(root: Path, names: Sequence[str]) -> dict[str, str]:
@@ -143,8 +143,8 @@ def _packed_marks(root: Place) -> dict[str, dict[str, str]]:
 
 
 def _marks(packed: PackedFolder) -> dict[str, str]:
-    there = {name: packed.files[name] for name in WATCHED if name in packed.files}
-    return {name: f"{one.size}.{one.mtime_ns}" for name, one in there.items()}
+    members = {name: packed.files[name] for name in WATCHED if name in packed.files}
+    return {name: f"{member.size}.{member.mtime_ns}" for name, member in members.items()}
 
 
 def _names(folder: str) -> list[str]:
@@ -170,7 +170,7 @@ def _stamps_of_objects(runs: ObjectPath) -> dict[str, str]:
         run, _, name = info.path.rpartition("/")
         if info.type == FileType.File and name in WATCHED:
             marks.setdefault(run.rpartition("/")[2], {})[name] = f"{info.size}.{info.mtime_ns}"
-    return {run: _short([own.get(n, "") for n in WATCHED]) for run, own in marks.items() if START in own}
+    return {run: _short([of_run.get(n, "") for n in WATCHED]) for run, of_run in marks.items() if START in of_run}
 
 
 def _short(marks: Iterable[str]) -> str:

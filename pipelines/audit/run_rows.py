@@ -43,20 +43,20 @@ TABLES = ("runs", "units", "parameters", "station", "coefficients", "figures")
 RUN_FIELDS = ("run", "measured", "started", "recipe", "device", "station", "capture", "rerun_of", "problem", "stamp")
 
 
-def _kept(schema: pa.Schema) -> pa.Schema:
+def _indexed(schema: pa.Schema) -> pa.Schema:
     """Columns of a run's table in the index: the run first, texts not encoded."""
     return pa.schema([("run", _TEXT), *((f.name, _TEXT if f.type == _FEW else f.type) for f in schema)])
 
 
 SCHEMAS: Mapping[str, pa.Schema] = {
     "runs": pa.schema([(name, _TEXT) for name in RUN_FIELDS]),
-    "units": _kept(READ["grades"]),
+    "units": _indexed(READ["grades"]),
     "parameters": pa.schema(
         [("run", _TEXT), ("unit", _TEXT), *((f"{n}{end}", _NUMBER) for n in NAMES for end in ("", "_error"))]
     ),
     "station": pa.schema([("run", _TEXT), ("effect", _TEXT), ("name", _TEXT), ("value", _NUMBER), ("error", _NUMBER)]),
-    "coefficients": _kept(READ["coefficients"]),
-    "figures": _kept(READ["figures"]),
+    "coefficients": _indexed(READ["coefficients"]),
+    "figures": _indexed(READ["figures"]),
 }
 
 
@@ -87,10 +87,10 @@ def rows_of_runs(run_files: Iterable[RunFiles]) -> dict[str, pa.Table]:
         except (OSError, ValueError, KeyError, TypeError, ArchiveUnusable) as trouble:  # ArrowInvalid is a ValueError
             problem = problem or first_line(trouble)
         lines.append(_line(files, about, problem))
-    kept = {"units": "grades", "coefficients": "coefficients", "figures": "figures"}
+    sources = {"units": "grades", "coefficients": "coefficients", "figures": "figures"}
     return {
         "runs": _from_rows(lines, SCHEMAS["runs"]),
-        **{name: _together(runs, table, SCHEMAS[name]) for name, table in kept.items()},
+        **{name: _together(runs, table, SCHEMAS[name]) for name, table in sources.items()},
         "parameters": _parameters([run for run in runs if len(run.tables.get("coefficients", ()))]),
         "station": _from_rows([row for run in runs for row in _station(run)], SCHEMAS["station"]),
     }
@@ -107,8 +107,8 @@ def _about(files: RunFiles) -> dict[str, Any]:
 
 def _tables(files: RunFiles) -> dict[str, pa.Table]:
     """The existing tables of a run, checked against their manifests."""
-    there = [name for name in READ if f"{name}.parquet" in files.content]
-    return {name: _table(name, files.content) for name in there}
+    present = [name for name in READ if f"{name}.parquet" in files.content]
+    return {name: _table(name, files.content) for name in present}
 
 
 def _table(name: str, content: Mapping[str, bytes]) -> pa.Table:
@@ -163,12 +163,12 @@ def _line(files: RunFiles, about: Mapping[str, Any], problem: str) -> tuple[str,
 
 def _together(runs: Sequence[_Run], name: str, schema: pa.Schema) -> pa.Table:
     """One table of all runs, with the run in front."""
-    own = [run for run in runs if name in run.tables]
-    if not own:
+    having = [run for run in runs if name in run.tables]
+    if not having:
         return schema.empty_table()
-    whole = pa.concat_tables([run.tables[name] for run in own])
-    names = np.repeat(np.array([run.id for run in own], dtype=object), [len(run.tables[name]) for run in own])
-    return whole.add_column(0, "run", pa.array(names, _TEXT)).cast(schema)
+    table = pa.concat_tables([run.tables[name] for run in having])
+    names = np.repeat(np.array([run.id for run in having], dtype=object), [len(run.tables[name]) for run in having])
+    return table.add_column(0, "run", pa.array(names, _TEXT)).cast(schema)
 
 
 def _parameters(runs: Sequence[_Run]) -> pa.Table:

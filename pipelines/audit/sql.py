@@ -58,7 +58,7 @@ def ask(
     Parameters
     ----------
     compact : whether ``coefficients``, ``figures`` … are read from the index; else from the files of the runs
-    index : one that the caller holds; None: the index is brought up to date first
+    index : an index that the caller holds; None: the index is brought up to date first
     """
     statement = one_reading_statement(sql)
     views = {word.lower() for word in WORD.findall(sql)} & set(VIEWS)
@@ -149,10 +149,10 @@ def _of_runs(archive: Archive, name: str) -> Any:
     runs = archive.root / "runs"
     if not isinstance(runs, Path):
         return gathered(runs.glob(f"*/{name}.parquet"))
-    places = sorted(runs.glob(f"*/{name}.parquet"))
-    if not places:
+    paths = sorted(runs.glob(f"*/{name}.parquet"))
+    if not paths:
         raise WrongUse(f"query: no run in {archive.root} has a table '{name}', one is needed; query another view")
-    return datasets_of_runs(places)
+    return datasets_of_runs(paths)
 
 
 LEDGER = (  # columns of the view: keys of a calibration's document
@@ -164,11 +164,11 @@ LEDGER = (  # columns of the view: keys of a calibration's document
 def _of_ledger(archive: Archive) -> pa.Table:
     from pipelines.certificates.ledger import Ledger
 
-    known = [dict(one.document()) for one in Ledger(archive).all()]
-    return pa.table({name: pa.array([one[name] for one in known], pa.string()) for name in LEDGER})
+    known = [dict(event.document()) for event in Ledger(archive).all()]
+    return pa.table({name: pa.array([entry[name] for entry in known], pa.string()) for name in LEDGER})
 
 
-def datasets_of_runs(places: Sequence[Path]) -> ds.Dataset:
+def datasets_of_runs(paths: Sequence[Path]) -> ds.Dataset:
     """Files ``…/<run>/<table>.parquet`` of a local archive, packed or not, as one table with the column ``run`` in front.
 
     A column that some runs do not have is null there.
@@ -181,43 +181,43 @@ def datasets_of_runs(places: Sequence[Path]) -> ds.Dataset:
     from pyarrow.fs import LocalFileSystem
 
     with ThreadPoolExecutor(READERS) as pool:
-        file_schemas = list(pool.map(_schema, places))
+        file_schemas = list(pool.map(_schema, paths))
     try:
         columns = pa.unify_schemas(file_schemas, promote_options="permissive").remove_metadata()
     except (pa.ArrowInvalid, pa.ArrowTypeError) as problem:
         raise ArchiveUnusable(
-            f"query: tables {places[0].name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "
+            f"query: tables {paths[0].name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "
             "verify'"
         ) from None
     form, system = ds.ParquetFileFormat(), LocalFileSystem()
     parts: list[Any] = []
-    for place in places:
-        run, source = ds.field("run") == place.parent.name, _source(place)
-        own = None if isinstance(source, pa.BufferReader) else system
-        parts.append(form.make_fragment(source, own, partition_expression=run))
+    for path in paths:
+        run, source = ds.field("run") == path.parent.name, _source(path)
+        filesystem = None if isinstance(source, pa.BufferReader) else system
+        parts.append(form.make_fragment(source, filesystem, partition_expression=run))
     schema = pa.schema([("run", pa.string()), *(field for field in columns if field.name != "run")])
     return ds.FileSystemDataset(parts, schema=schema, format=form, filesystem=system)
 
 
-def gathered(places: Iterable[Place]) -> pa.Table:
+def gathered(paths: Iterable[Place]) -> pa.Table:
     """Tables of an object store, read into memory, with the column ``run`` in front."""
     parts: list[pa.Table] = []
-    for place in places:
-        table = pq.ParquetFile(pa.BufferReader(place.read_bytes())).read()
-        parts.append(table.add_column(0, "run", pa.repeat(pa.scalar(place.parent.name), len(table))))
+    for path in paths:
+        table = pq.ParquetFile(pa.BufferReader(path.read_bytes())).read()
+        parts.append(table.add_column(0, "run", pa.repeat(pa.scalar(path.parent.name), len(table))))
     return pa.concat_tables(parts, promote_options="default") if parts else pa.table({"run": pa.array([], pa.string())})
 
 
-def _source(place: Path) -> pa.BufferReader | str:
-    """Where the bytes of a file are: its own path, or its part of a pack, which is read when it is needed."""
-    member = member_of(place)
+def _source(path: Path) -> pa.BufferReader | str:
+    """The source of the bytes of a file: its path, or its part of a pack, which is read when it is needed."""
+    member = member_of(path)
     if member is None:
-        return str(place)
+        return str(path)
     try:
-        whole = _mapped(str(member.pack))
+        pack = _mapped(str(member.pack))
     except FileNotFoundError:  # its pack was merged with others
-        return pa.BufferReader(place.read_bytes())
-    return pa.BufferReader(pa.py_buffer(memoryview(whole)[member.offset : member.offset + member.size]))
+        return pa.BufferReader(path.read_bytes())
+    return pa.BufferReader(pa.py_buffer(memoryview(pack)[member.offset : member.offset + member.size]))
 
 
 @lru_cache(maxsize=512)
@@ -227,11 +227,11 @@ def _mapped(pack: str) -> mmap.mmap:
         return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
 
-def _schema(place: Path) -> pa.Schema:
+def _schema(path: Path) -> pa.Schema:
     try:
-        return pq.read_schema(_source(place)).remove_metadata()
+        return pq.read_schema(_source(path)).remove_metadata()
     except (OSError, pa.ArrowInvalid) as problem:
         raise ArchiveUnusable(
-            f"query: {place} is not a complete Parquet file ({first_line(problem)}); restore it from a copy, see 'tumbleline "
+            f"query: {path} is not a complete Parquet file ({first_line(problem)}); restore it from a copy, see 'tumbleline "
             "verify'"
         ) from None

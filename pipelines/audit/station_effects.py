@@ -141,13 +141,13 @@ def _fitted(mean: Array, state: State, model: Sequence[str]) -> list[StationValu
 
 def _bases(state: State, model: Sequence[str]) -> list[Array]:
     """Orthonormal columns of the units' model on each axis, (n, p)."""
-    kept = [e for name in model if isinstance(e := _effect(name), SensorEffect)]
+    effects = [e for name in model if isinstance(e := _effect(name), SensorEffect)]
     while True:
         try:
-            columns = design.local_columns(kept, state, design.starting_values(kept, state))
+            columns = design.local_columns(effects, state, design.starting_values(effects, state))
             break
         except MissingInput as lack:  # components that the residuals do not have are not projected out
-            kept = [e for e in kept if e.id != lack.effect]
+            effects = [e for e in effects if e.id != lack.effect]
     return [np.linalg.qr(columns[axis])[0] for axis in range(3)]
 
 
@@ -161,10 +161,10 @@ def _projected(effect: StationEffect, state: State, bases: list[Array]) -> Array
         change = effect.force_change(state, **design.starting_values([effect], state).get(effect.id, {}))
     except MissingInput:
         return None
-    whole = np.concatenate([change[:, axis, :] for axis in range(3)])
+    columns = np.concatenate([change[:, axis, :] for axis in range(3)])
     left = np.concatenate([_without(change[:, axis, :], bases[axis]) for axis in range(3)])
     singular = np.linalg.svd(left, compute_uv=False)
-    return left if singular[-1] > SEEN * np.linalg.norm(whole) else None
+    return left if singular[-1] > SEEN * np.linalg.norm(columns) else None
 
 
 def _alike(columns: Array, other: Array) -> bool:

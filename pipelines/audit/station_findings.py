@@ -70,11 +70,13 @@ def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str) 
 
 def _measured(audit: Audit, series: StationSeries, start: float, end: float) -> tuple[tuple[str, ...], int]:
     """Units measured on a series' station, or in its slot, after the last measurement before the change."""
-    own = audit.all
-    rows = (own.station == series.station) & (own.day > start) & (own.day < end) & audit.product
+    calibrations = audit.all
+    rows = (
+        (calibrations.station == series.station) & (calibrations.day > start) & (calibrations.day < end) & audit.product
+    )
     if series.where.startswith("slot "):
-        rows &= own.slot == int(series.where.removeprefix("slot "))
-    return tuple(sorted({str(u) for u in own.unit[rows]})), len({str(r) for r in own.run[rows]})
+        rows &= calibrations.slot == int(series.where.removeprefix("slot "))
+    return tuple(sorted({str(u) for u in calibrations.unit[rows]})), len({str(r) for r in calibrations.run[rows]})
 
 
 def _standards(audit: Audit) -> Iterator[AuditFinding]:
@@ -98,11 +100,14 @@ def _gauges(audit: Audit) -> Iterator[AuditFinding]:
     most = audit.rules.gauge_most_percent
     bad = [s for s in audit.studies if np.isfinite(s.of_tolerance) and s.of_tolerance > most]
     for runs in dict.fromkeys(study.runs for study in bad):
-        own = sorted((study for study in bad if study.runs == runs), key=lambda study: -study.of_tolerance)
-        shares = ", ".join(f"{parameter_text(study.parameter)} {study.of_tolerance:.0f} %" for study in own)
+        studies = sorted((study for study in bad if study.runs == runs), key=lambda study: -study.of_tolerance)
+        shares = ", ".join(f"{parameter_text(study.parameter)} {study.of_tolerance:.0f} %" for study in studies)
         message = (
-            f"{own[0].device}: repeated seating takes more than the allowed {most:g} % of the tolerance: {shares} "
-            f"(study of {date_of(own[0].first_day)}, {number_of(len(runs), 'run')}); measure longer, or widen the tolerance"
+            f"{studies[0].device}: repeated seating takes more than the allowed {most:g} % of the tolerance: {shares} "
+            f"(study of {date_of(studies[0].first_day)}, {number_of(len(runs), 'run')}); measure longer, or widen the tolerance"
         )
-        evidence = {"runs": list(runs), "percent_of_tolerance": {study.parameter: study.of_tolerance for study in own}}
-        yield AuditFinding("station", "gauge", own[0].device, message, (), evidence)
+        evidence = {
+            "runs": list(runs),
+            "percent_of_tolerance": {study.parameter: study.of_tolerance for study in studies},
+        }
+        yield AuditFinding("station", "gauge", studies[0].device, message, (), evidence)

@@ -10,7 +10,7 @@ from inertial.population.change_points import ChangePoint, change_points, noise_
 from inertial.population.control_charts import Baseline, alarms, baseline, chance_of_alarms, signals
 from inertial.population.two_way import unit_and_place
 from pipelines.audit.calibrations import Calibrations, codes
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.rules import Rules
 
@@ -67,22 +67,24 @@ def slot_series(calibrations: Calibrations, good: Flags) -> tuple[list[StationSe
         return [], []
     units = codes(calibrations.histories[rows].astype(str))
     seats = [f"{s} slot {n}" for s, n in zip(calibrations.station[rows], calibrations.slot[rows], strict=True)]
-    names, place = np.unique(seats, return_inverse=True)
+    names, seat_of = np.unique(seats, return_inverse=True)
     out: list[StationSeries] = []
     means: dict[str, dict[str, object]] = {str(name): {"where": str(name)} for name in names}
     for turn in TURNS:
         values = 1e3 * calibrations.column(turn)[rows]
-        unit, seat = unit_and_place(values, units, place)
+        unit, seat = unit_and_place(values, units, seat_of)
         left = values - unit[units]
         for number, name in enumerate(names):
             means[str(name)][f"{turn}_urad"] = float(seat[number])
-            own = rows[place == number]
-            order = np.lexsort((calibrations.run[own].astype(str), calibrations.day[own]))
-            if own.size >= FEWEST:
+            of_seat = rows[seat_of == number]
+            order = np.lexsort((calibrations.run[of_seat].astype(str), calibrations.day[of_seat]))
+            if of_seat.size >= FEWEST:
                 station, _, slot = str(name).rpartition(" slot ")
                 key = (station, f"slot {slot}", turn)
-                rest, level = left[place == number][order], LEVEL / (names.size * len(TURNS))
-                out.append(_series(key, calibrations.day[own][order], rest, calibrations.run[own][order], level))
+                rest, level = left[seat_of == number][order], LEVEL / (names.size * len(TURNS))
+                out.append(
+                    _series(key, calibrations.day[of_seat][order], rest, calibrations.run[of_seat][order], level)
+                )
     return out, list(means.values())
 
 
@@ -128,21 +130,24 @@ def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[Contr
     keys = np.array([f"{calibrations.station[k]}\t{calibrations.unit[k]}" for k in rows], dtype=object)
     out: list[ControlChart] = []
     for key in np.unique(keys.astype(str)):
-        own = rows[keys == key]
-        own = own[np.lexsort((calibrations.run[own].astype(str), calibrations.day[own]))]
+        of_standard = rows[keys == key]
+        order = np.lexsort((calibrations.run[of_standard].astype(str), calibrations.day[of_standard]))
+        of_standard = of_standard[order]
         station, unit = str(key).split("\t")
-        for name in OWN:
-            values = calibrations.column(name)[own]
-            kept = np.isfinite(values)
-            if kept.sum() > rules.baseline_points:
-                out.append(_chart(calibrations, own[kept], (station, unit, name), values[kept], rules, since))
+        for name in OF_UNIT:
+            values = calibrations.column(name)[of_standard]
+            finite = np.isfinite(values)
+            if finite.sum() > rules.baseline_points:
+                out.append(
+                    _chart(calibrations, of_standard[finite], (station, unit, name), values[finite], rules, since)
+                )
     level = CHART_LEVEL / max(len(out), 1)
     return [replace(chart, in_control=chart.p_value >= level) for chart in out]
 
 
 def _chart(
     calibrations: Calibrations,
-    own: Index,
+    rows: Index,
     key: tuple[str, str, str],
     values: Array,
     rules: Rules,
@@ -150,11 +155,11 @@ def _chart(
 ) -> ControlChart:
     chart = baseline(values, rules.baseline_points)
     by_rule, moving = signals(values, chart)
-    day = calibrations.day[own]
+    day = calibrations.day[rows]
     counted = (np.arange(values.size) >= rules.baseline_points) & (day >= since)
     number = alarms(by_rule, moving.outside, counted)
     chance = chance_of_alarms(values, rules.baseline_points, int(counted.sum()))
     return ControlChart(
-        *key, unit_text(key[2]), day, values, calibrations.run[own], chart, by_rule & counted, moving.average,
+        *key, unit_text(key[2]), day, values, calibrations.run[rows], chart, by_rule & counted, moving.average,
         moving.outside & counted, number, chance.mean, chance.p_value(number), in_control=True,
     )  # fmt: skip

@@ -34,7 +34,7 @@ class TablesInMemory:
     def __init__(self, tables: Mapping[str, pa.Table]) -> None:
         self._asking = threading.Lock()
         self._connection = sqlite3.connect(":memory:", check_same_thread=False)
-        # its own leaves letters beyond ASCII
+        # lower() of SQLite leaves letters beyond ASCII
         self._connection.create_function("lower", 1, str.lower, deterministic=True)
         for name, table in tables.items():
             columns = ", ".join(f'"{column}"' for column in table.column_names)
@@ -58,12 +58,13 @@ class TablesInMemory:
 
 def rows_of_index(index: AuditIndex | None, name: str) -> Any:
     """A table of the index as Arrow data: its files, to be read when they are scanned, or the table where they are elsewhere."""
-    kept = [column for column in SCHEMAS[name].names if column != "stamp"]
+    columns = [column for column in SCHEMAS[name].names if column != "stamp"]
     if index is None or not index.parts or not isinstance(index.parts[0], Path):
-        return index.table(name, kept) if index is not None else SCHEMAS[name].empty_table().select(kept)
+        return index.table(name, columns) if index is not None else SCHEMAS[name].empty_table().select(columns)
     from pyarrow.fs import LocalFileSystem
 
-    schema, form, system = pa.schema([SCHEMAS[name].field(c) for c in kept]), ds.ParquetFileFormat(), LocalFileSystem()
+    schema = pa.schema([SCHEMAS[name].field(column) for column in columns])
+    form, system = ds.ParquetFileFormat(), LocalFileSystem()
     parts = [form.make_fragment(file, system) for file in index.files(name)]
     return ds.FileSystemDataset(parts, schema=schema, format=form, filesystem=system)
 

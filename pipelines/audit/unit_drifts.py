@@ -64,15 +64,15 @@ def unit_drifts(
     final = pairs.chosen(last_of_each(calibrations.histories[pairs.later]))
     out: dict[str, list[UnitDrift]] = {}
     for device in dict.fromkeys(kind.device for kind in kinds):
-        own = [kind for kind in kinds if kind.device == device]
+        of_device = [kind for kind in kinds if kind.device == device]
         rows = final.chosen(np.flatnonzero(calibrations.device[final.later] == device))
         # of all parameters together, assumed independent
         probability = np.ones((rows.later.size, AHEAD.size), dtype=np.float32)
-        courses = [_course(calibrations, good, rows, kind, limits, probability) for kind in own]
-        bounded = any(np.isfinite(kind.tolerance) for kind in own) and all(kind.known for kind in own)
+        courses = [_course(calibrations, good, rows, kind, limits, probability) for kind in of_device]
+        bounded = any(np.isfinite(kind.tolerance) for kind in of_device) and all(kind.known for kind in of_device)
         years = last_reliable(probability, rules.reliability_target, AHEAD) if bounded else np.inf
         until = calibrations.day[rows.later] + YEAR_D * years
-        for kind, course in zip(own, courses, strict=True):
+        for kind, course in zip(of_device, courses, strict=True):
             for drift in _unit_drifts(calibrations, rows, kind, course, until):
                 out.setdefault(f"{drift.device} {drift.unit}", []).append(drift)
     return out
@@ -150,11 +150,11 @@ def _leaving(mean: Array, deviation: Array, bound: float, day: Array) -> Array:
 def _padded(calibrations: Calibrations, good: Flags, rows: Pairs, name: str) -> tuple[Array, Array, Array]:
     """Values, errors and years of the units of these last calibrations, (units, most), filled with NaN."""
     units = calibrations.histories[rows.later]
-    place = np.full(int(calibrations.histories.max()) + 1, -1)
-    place[units] = np.arange(units.size)
+    index = np.full(int(calibrations.histories.max()) + 1, -1)
+    index[units] = np.arange(units.size)
     value, error = calibrations.column(name), calibrations.error(name)
-    use = np.flatnonzero(good & (place[calibrations.histories] >= 0) & np.isfinite(value + error))
-    unit = place[calibrations.histories[use]]
+    use = np.flatnonzero(good & (index[calibrations.histories] >= 0) & np.isfinite(value + error))
+    unit = index[calibrations.histories[use]]
     starts = first_of_each(unit)
     order = np.arange(use.size) - np.repeat(starts, np.diff(np.append(starts, use.size)))
     shape = (units.size, int(order.max()) + 1 if use.size else 1)

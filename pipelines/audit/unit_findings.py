@@ -42,16 +42,22 @@ def _where(calibrations: Calibrations, row: int) -> str:
 
 
 def _exchanged(audit: Audit) -> Iterator[AuditFinding]:
-    for one in audit.strangers:
-        unit, run, day = (str(getattr(audit.all, n)[one.row]) for n in ("unit", "run", "day"))
-        evidence = {"run": run, "date": date_of(float(day)), "distance": one.distance, "looks_like": one.looks_like}
-        if one.looks_like:
-            how = "and vice versa" if one.exchanged else "whose own calibration of that day differs"
+    for stranger in audit.strangers:
+        unit, run, day = (str(getattr(audit.all, n)[stranger.row]) for n in ("unit", "run", "day"))
+        evidence = {
+            "run": run,
+            "date": date_of(float(day)),
+            "distance": stranger.distance,
+            "looks_like": stranger.looks_like,
+        }
+        if stranger.looks_like:
+            how = "and vice versa" if stranger.exchanged else "whose own calibration of that day differs"
             message = (
-                f"{unit} of {date_of(float(day))} (run {run}) does not fit its history, it fits that of {one.looks_like}, {how}: "
-                "serials were exchanged; read both labels, revoke the certificates and certify again"
+                f"{unit} of {date_of(float(day))} (run {run}) does not fit its history, it fits that of "
+                f"{stranger.looks_like}, {how}: serials were exchanged; read both labels, revoke the certificates "
+                "and certify again"
             )
-            yield AuditFinding("quality", "exchanged", unit, message, (unit, one.looks_like), evidence)
+            yield AuditFinding("quality", "exchanged", unit, message, (unit, stranger.looks_like), evidence)
         else:
             message = (
                 f"{unit} of {date_of(float(day))} (run {run}) fits neither its own history nor that of any other unit: it was "
@@ -85,11 +91,11 @@ def _leaving(audit: Audit) -> Iterator[AuditFinding]:
     }
     for unit, drifts in audit.units.items():
         due = due_day.get(unit, np.inf)
-        leavings = [one for drift in drifts for one in _leavings(drift) if drift.day < one[0][0] < due]
+        leavings = [leaving for drift in drifts for leaving in _leavings(drift) if drift.day < leaving[0][0] < due]
         if not leavings:
             continue
-        days, what, bound, drift = min(leavings, key=lambda one: one[0][0])
-        text, others = unit_text(drift.parameter), list(dict.fromkeys(one[3].parameter for one in leavings))
+        days, what, bound, drift = min(leavings, key=lambda leaving: leaving[0][0])
+        text, others = unit_text(drift.parameter), list(dict.fromkeys(leaving[3].parameter for leaving in leavings))
         moves = f"drifts {_signed(drift.slope)} {text} a year" if np.isfinite(drift.slope) else "drifts like its kind"
         message = (
             f"{drift.unit}: {parameter_text(drift.parameter)} {moves} and leaves its {what} of {bound:g} {text} "
@@ -177,9 +183,9 @@ def twice(calibrations: Calibrations) -> dict[str, tuple[int, int]]:
     """Serials of two units, in order, with the rows of two calibrations that cannot be of one unit."""
     order = np.lexsort((calibrations.day, calibrations.unit.astype(str)))
     unit, device, station = (column[order] for column in (calibrations.unit, calibrations.device, calibrations.station))
-    same = unit[1:] == unit[:-1]
+    same_unit = unit[1:] == unit[:-1]
     close = (np.diff(calibrations.day[order]) < AT_ONCE_D) & (station[1:] != station[:-1])
     by_serial: dict[str, tuple[int, int]] = {}
-    for k in np.flatnonzero(same & ((device[1:] != device[:-1]) | close)):
+    for k in np.flatnonzero(same_unit & ((device[1:] != device[:-1]) | close)):
         by_serial.setdefault(str(unit[k]), (int(order[k]), int(order[k + 1])))
     return by_serial

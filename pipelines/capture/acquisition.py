@@ -213,14 +213,14 @@ class Acquisition:
 
     def prepare(self, step: Step) -> None:
         """Sets the equipment of a step on the table, and brings all other equipment to the state of records without it."""
-        own = step.order if step.order is not None and step.order.on_table else None
+        order = step.order if step.order is not None and step.order.on_table else None
         for role, equipment in self.station.equipment.items():
-            if own is None or role != own.role:
+            if order is None or role != order.role:
                 equipment.stand_by()
         ratio = 1.0
-        if own is not None:
+        if order is not None:
             procedure = procedure_of(self.recipe, step.procedure, SetsEquipment)
-            ratio = procedure.set_equipment(self.station.equipment[own.role], own).get("supply_ratio", 1.0)
+            ratio = procedure.set_equipment(self.station.equipment[order.role], order).get("supply_ratio", 1.0)
         self.supervisor.expect_supply(ratio)
 
     def measure_on_equipment(self, step: Step, order: ProcedureStep) -> tuple[Record, pd.DataFrame, pd.DataFrame]:

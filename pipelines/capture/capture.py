@@ -100,8 +100,10 @@ class CaptureRun:
         look = recorded_look(supervisor.events.recorded(), step.record)
         if look is None and not passed:
             self.report(step, "comparing the records so far with what is asked for")
-            told = frozenset(event.action.split()[1] for event in supervisor.events.recorded() if event.kind == "fails")
-            look = looks.look(step.record, told)
+            known = frozenset(
+                event.action.split()[1] for event in supervisor.events.recorded() if event.kind == "fails"
+            )
+            look = looks.look(step.record, known)
             for serial, sentence in look.fails.items():
                 supervisor.note("fails", step.record, sentence, f"unit {serial} fails already, the others go on")
                 self.report(step, f"unit {serial} fails already: {sentence}")

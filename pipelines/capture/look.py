@@ -1,4 +1,4 @@
-"""What a look at the records of a capture says, and what the journal keeps of it."""
+"""The evaluation of the records of a capture while it goes on, and its entry in the journal."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,10 +11,10 @@ DWELL_S = "dwell_s"
 
 @dataclass(frozen=True)
 class Look:
-    """What the records so far say.
+    """The evaluation of the records so far.
 
     known : whether every unit is decided; text : why, or what is missing
-    fails : units that have not been told before, with the figure that they fail; given_up : effects that the end leaves unseen
+    fails : units not reported before, with the figure that they fail; given_up : effects that the end leaves unseen
     dwell_s : length of the dwells from here on; None where it stays
     """
 
@@ -26,14 +26,14 @@ class Look:
 
 
 class Looks(Protocol):
-    """What decides during a capture."""
+    """Decides during a capture whether further records are needed."""
 
     def due(self, record: int) -> bool:
-        """Whether the records are looked at after this one."""
+        """Whether the records so far are evaluated after this record."""
         ...
 
-    def look(self, record: int, told: frozenset[str]) -> Look:
-        """What the records up to this one say; ``told``: units that fail already."""
+    def look(self, record: int, reported: frozenset[str]) -> Look:
+        """The evaluation of the records up to this record; ``reported``: units whose failure is known already."""
         ...
 
 

@@ -212,11 +212,11 @@ class Plausibility:
         """
         for unit in units:
             try:
-                same = self.reader.slots[unit.slot].holds(unit.serial)
+                matches = self.reader.slots[unit.slot].holds(unit.serial)
             except StationError as problem:
                 yield unit, problem
                 continue
-            if not same:
+            if not matches:
                 raise OperatorNeeded(
                     f"slot {unit.slot}: '{unit.serial}' is no longer there; seat the units as they were, or measure "
                     "the lot anew"

@@ -17,7 +17,7 @@ TABLES = ("coefficients", "covariance", "grades")
 
 
 def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
-    """Files of a run, and certificates of its units, without a signature of the own key; empty without an own key.
+    """Files of a run, and certificates of its units, without a signature of the configured key; empty where no key is configured.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
         return []
     by_state: dict[str, list[str]] = {}
     manifests = (run.path / f"{name}.json" for name in ("run", *TABLES))
-    for place in (*(manifest for manifest in manifests if manifest.is_file()), *_certificates(run, serials)):
-        state = check(files.read_json(place), keys)
-        name = str(place)[len(str(run.archive.root)) :].lstrip("/\\")
+    for path in (*(manifest for manifest in manifests if manifest.is_file()), *_certificates(run, serials)):
+        state = check(files.read_json(path), keys)
+        name = str(path)[len(str(run.archive.root)) :].lstrip("/\\")
         if state == BAD:
             raise ArchiveUnusable(
                 f"archive: {name} was edited after it was signed; restore it from a copy, see 'tumbleline verify {run.id}'"
@@ -51,14 +51,14 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
 def changed_tables(run: Run) -> list[str]:
     """Tables of the result of a run that are not as their manifests say, by their hashes."""
     names = names_in(run.path)
-    there = [name for name in TABLES if {f"{name}.parquet", f"{name}.json"} <= names]
-    return [name for name in there if files.sha256(run.path / f"{name}.parquet") != run.manifest(name)["sha256"]]
+    present = [name for name in TABLES if {f"{name}.parquet", f"{name}.json"} <= names]
+    return [name for name in present if files.sha256(run.path / f"{name}.parquet") != run.manifest(name)["sha256"]]
 
 
 def library_remarks(run: Run) -> list[str]:
     """Libraries with more than one version among the tables of the run."""
-    there = [name for name in run.tables() if (run.path / f"{name}.json").is_file()]
-    return differing_libraries(run.id, {name: run.manifest(name) for name in there})
+    present = [name for name in run.tables() if (run.path / f"{name}.json").is_file()]
+    return differing_libraries(run.id, {name: run.manifest(name) for name in present})
 
 
 def _certificates(run: Run, serials: Iterable[str]) -> list[Place]:
@@ -104,19 +104,19 @@ def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    place = run.path / "coefficients.parquet"
+    path = run.path / "coefficients.parquet"
     try:
-        data = place.read_bytes()
+        data = path.read_bytes()
         if hashlib.sha256(data).hexdigest() != calibration.event.coefficients:
             raise ArchiveUnusable(
-                f"calibrations: {place} is not the table of certificate {calibration.certificate} (its hash "
+                f"calibrations: {path} is not the table of certificate {calibration.certificate} (its hash "
                 "differs); restore it from a copy"
             )
         # read_table imports pandas; and a thread pool that is still starting aborts so short a process at its end
         table = pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
     except (OSError, pa.ArrowInvalid) as problem:
         raise ArchiveUnusable(
-            f"calibrations: {place} cannot be read ({first_line(problem)}); restore it from a copy"
+            f"calibrations: {path} cannot be read ({first_line(problem)}); restore it from a copy"
         ) from None
     # table.take would make an array of the row numbers, and pyarrow asks pandas whether they are a series
     return [row for row in table.to_pylist() if row["unit"] == calibration.serial]

@@ -1,4 +1,4 @@
-"""Which results by comparison of a run can be certified: those of sweep, random vibration, transverse and shock; and why not."""
+"""Results by comparison that can be certified (sweep, random vibration, transverse, shock), and why others cannot."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ class Comparisons:
         known = bool(about.get("capture")) and {*TABLES} <= {*run.tables()}
         listed = (about.get("recipe") or {}).get("procedures") or []
         self.parts: dict[int, Any] = {}
-        if known and any(isinstance(PROCEDURES.get(str(one.get("kind"))), Compares) for one in listed):
+        if known and any(isinstance(PROCEDURES.get(str(procedure.get("kind"))), Compares) for procedure in listed):
             parts = enumerate(parts_of(Recipe.model_validate(about["recipe"])))
             self.parts = {number: part for number, part in parts if isinstance(PROCEDURES[part.kind], Compares)}
         self._run, self._terms = run, archived_terms(about)
@@ -100,8 +100,8 @@ class Comparisons:
 
     def _reference_understated(self, part: Any, name: str, rows: pd.DataFrame) -> str:
         """Figures with limits rest on reference_percent of the recipe: it may not be below what the station states."""
-        own = {figure.name for figure in PROCEDURES[part.kind].figures}
-        limited = own & {*((self._run.about.get("limits") or {}).get("figures") or {})}
+        figures = {figure.name for figure in PROCEDURES[part.kind].figures}
+        limited = figures & {*((self._run.about.get("limits") or {}).get("figures") or {})}
         stated = getattr(part, "reference_percent", None)
         terms = self._terms
         known = (
@@ -111,7 +111,7 @@ class Comparisons:
         )
         if stated is None or known is None or not limited:
             return ""
-        needed = 100.0 * float(np.linalg.norm([known.entries[one].standard().u for one in ("reference", "drift")]))
+        needed = 100.0 * float(np.linalg.norm([known.entries[entry].standard().u for entry in ("reference", "drift")]))
         if needed <= stated * (1.0 + 1e-9):
             return ""
         return (
@@ -129,7 +129,7 @@ def _unstated(rows: pd.DataFrame, terms: BudgetTerms) -> str:
     if not missing:
         return ""
     role = str(rows["role"].iloc[0])
-    settings = [at for every in missing.values() for at in every if np.isfinite(at)]
+    settings = [at for missing_at in missing.values() for at in missing_at if np.isfinite(at)]
     where = f" at {min(settings):.4g} to {max(settings):.4g} Hz" if settings else ""
     named = ", ".join(sorted(missing, key=TERMS.index))
     return (

@@ -112,5 +112,5 @@ def numbered_files(folder: Place) -> list[Place]:
     """The files ``<number>.json`` of a unit's folder in order; none where there is no folder."""
     if isinstance(folder, Path) and not folder.is_dir():
         return []
-    files = {place.name: place for place in folder.iterdir() if place.name.endswith(".json")}
+    files = {path.name: path for path in folder.iterdir() if path.name.endswith(".json")}
     return [files[name] for name in sorted(files) if is_number(name.removesuffix(".json"))]

@@ -29,7 +29,7 @@ class Ledger:
 
     Parameters
     ----------
-    archive : the archive, or its place or address.
+    archive : the archive, or its root or address.
     """
 
     def __init__(self, archive: Archive | Place | str) -> None:
@@ -80,11 +80,11 @@ class Ledger:
 
         def decided(events: Sequence[LedgerEntry]) -> LedgerEntry | None:
             known = calibrations_of(events)
-            if any(_same(one, event) for one in known):
+            if any(_same(calibration, event) for calibration in known):
                 return None
             refuse_other_device(known, event)
-            alike = [one for one in known if event.ends_others_of(one.event)]
-            ends = overlapped(alike, event.start, event.until, supersede=supersede)
+            same_kind = [calibration for calibration in known if event.ends_others_of(calibration.event)]
+            ends = overlapped(same_kind, event.start, event.until, supersede=supersede)
             return replace(event, action="supersede" if ends else "certify", ends=ends)
 
         written = self._append(event.serial, decided)
@@ -106,13 +106,15 @@ class Ledger:
             raise WrongUse("revoke: no reason is given, one is needed for the users of the calibration; add --reason")
 
         def decided(events: Sequence[LedgerEntry]) -> LedgerEntry:
-            known = [one for one in calibrations_of(events) if one.start < one.until]
-            chosen = [one for one in known if certificate in {0, one.event.sequence}]
-            meant = [one for one in chosen if one.until > (day or ("" if certificate else today()))]
+            known = [calibration for calibration in calibrations_of(events) if calibration.start < calibration.until]
+            chosen = [calibration for calibration in known if certificate in {0, calibration.event.sequence}]
+            meant = [
+                calibration for calibration in chosen if calibration.until > (day or ("" if certificate else today()))
+            ]
             if not meant:
                 raise WrongUse(nothing_to_revoke(serial, known, certificate, day))
-            start = day or min(one.start for one in meant)
-            ends = tuple(one.event.sequence for one in meant)
+            start = day or min(calibration.start for calibration in meant)
+            ends = tuple(calibration.event.sequence for calibration in meant)
             last = meant[-1].event
             return replace(
                 last, action="revoke", start=start, until=LAST, ends=ends, reason=reason.strip(), evidence=()
@@ -127,8 +129,8 @@ class Ledger:
     def anchor(self, events: Sequence[LedgerEntry]) -> None:
         """Add events to the chain of the archive, so that the removal of one is detected."""
         if events:
-            places = {self._place(event.serial, event.sequence): event for event in events}
-            sealed = {place: files.sha256(self.root / place) for place in sorted(places)}
+            paths = {self._name(event.serial, event.sequence): event for event in events}
+            sealed = {path: files.sha256(self.root / path) for path in sorted(paths)}
             hash_chain.append(self.root, "calibrations", sealed, {**provenance(), "run": events[0].run})
 
     def write_bulk(self, events: Iterable[LedgerEntry]) -> int:
@@ -141,9 +143,9 @@ class Ledger:
         count, last = 0, dict[str, str]()
         for event in events:
             data = files.json_bytes(replace(event, previous=last.get(event.serial, "")).document())
-            place = self.root / self._place(event.serial, event.sequence)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(data)
+            path = self.root / self._name(event.serial, event.sequence)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
             last[event.serial] = hashlib.sha256(data).hexdigest()
             count += 1
         return count
@@ -154,19 +156,19 @@ class Ledger:
         with alone(folder, wait=True) if isinstance(folder, ObjectPath) else nullcontext():
             while True:
                 known = self._read(serial)
-                event = decide([one for one, _ in known])
+                event = decide([event for event, _ in known])
                 if event is None:
                     return None
                 event = _stamped(event, known)
                 data = files.manifest_bytes(event.document())
-                if files.publish_first(self.root / self._place(serial, event.sequence), data):
+                if files.publish_first(self.root / self._name(serial, event.sequence), data):
                     return event
 
     def _folder(self, serial: str) -> Place:
         return self.root / folder_of(serial)
 
     @staticmethod
-    def _place(serial: str, sequence: int) -> str:
+    def _name(serial: str, sequence: int) -> str:
         return f"{folder_of(serial)}/{sequence:06d}.json"
 
     def _read(self, serial: str) -> list[tuple[LedgerEntry, str]]:
@@ -183,12 +185,12 @@ class Ledger:
 def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
     """Events of a unit's folder with the hashes of their files; refused where one between them is missing."""
     events: list[tuple[LedgerEntry, str]] = []
-    for count, place in enumerate(numbered_files(folder), 1):
-        data = place.read_bytes()
-        event = event_of(files.parsed(data, place), str(place))
-        if event.sequence != count or place.name != f"{count:06d}.json":
+    for count, path in enumerate(numbered_files(folder), 1):
+        data = path.read_bytes()
+        event = event_of(files.parsed(data, path), str(path))
+        if event.sequence != count or path.name != f"{count:06d}.json":
             raise ArchiveUnusable(
-                f"calibrations: {folder} has event {place.name} where number {count} is needed; restore the missing file from a "
+                f"calibrations: {folder} has event {path.name} where number {count} is needed; restore the missing file from a "
                 "copy"
             )
         events.append((event, hashlib.sha256(data).hexdigest()))
@@ -216,7 +218,7 @@ def _same(calibration: Calibration, event: LedgerEntry) -> bool:
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
-    """By serial, the calibration that certifies this run: the one that is not ended, else the last.
+    """By serial, the calibration that certifies this run: the valid calibration, else the last.
 
     Raises
     ------
@@ -225,10 +227,10 @@ def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
     """
     ledger, out = Ledger(run.archive.root), dict[str, Calibration]()
     for serial in serials:
-        own = [calibration for calibration in ledger.calibrations(serial) if calibration.run == run.id]
-        if not own:
+        of_run = [calibration for calibration in ledger.calibrations(serial) if calibration.run == run.id]
+        if not of_run:
             continue
-        chosen = out[serial] = next((one for one in own if one.state == "valid"), own[-1])
+        chosen = out[serial] = next((calibration for calibration in of_run if calibration.state == "valid"), of_run[-1])
         present = run.manifest("coefficients")["sha256"]
         if chosen.state != "revoked" and present != chosen.event.coefficients:
             raise ArchiveUnusable(

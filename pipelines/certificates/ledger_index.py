@@ -55,26 +55,26 @@ def histories_of(root: Place) -> Histories:
     histories = Histories()
     stamps = stamps_of(root / FOLDER)
     for digit in DIGITS:
-        own = stamps.get(digit, {})
-        if own:
-            _gather(histories, root, _events(histories, root, digit, own))
+        stamps_of_digit = stamps.get(digit, {})
+        if stamps_of_digit:
+            _gather(histories, root, _events(histories, root, digit, stamps_of_digit))
     return histories
 
 
 def _events(histories: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, LedgerEntry | str]:
-    """Events by the places of their files, or the fault of a file; new events are added to the index."""
-    place = root / INDEX_FOLDER / f"{digit}.noted"
-    before, state = indexed_events(place)
+    """Events by the paths of their files, or the fault of a file; new events are added to the index."""
+    path = root / INDEX_FOLDER / f"{digit}.noted"
+    before, state = indexed_events(path)
     if state == derived.EDITED:
-        derived.warn_of_edits(place)
-    known = {name: one for name, one in before.items() if stamps.get(name) == one.stamp}
+        derived.warn_of_edits(path)
+    known = {name: entry for name, entry in before.items() if stamps.get(name) == entry.stamp}
     missing = [name for name in stamps if name not in known]
     read = all_read(root / FOLDER, missing)
     histories.read += len(read)
     new = {name: IndexedEvent(stamps[name], event) for name, event in read.items() if isinstance(event, LedgerEntry)}
     if len(new) + len(before) - len(known) >= FEWEST_NEW or state == derived.EDITED:
         with suppress(ArchiveUnusable):  # a reader without write permission does without the index
-            files.publish(place, derived.framed(_encoded(known | new)))
+            files.publish(path, derived.framed(_encoded(known | new)))
     return {name: known[name].event if name in known else read[name] for name in stamps}
 
 
@@ -84,16 +84,16 @@ def _gather(histories: Histories, root: Place, events: Mapping[str, LedgerEntry 
     for name in sorted(events):
         by_unit.setdefault(name.rpartition("/")[0], []).append(name)
     for folder, names in by_unit.items():
-        own: list[LedgerEntry] = []
+        history: list[LedgerEntry] = []
         for count, name in enumerate(names, 1):
             event = events[name]
             wrong = event if isinstance(event, str) else _wrong(event, folder, count, name)
             if wrong or isinstance(event, str):
                 histories.problems[str(root / FOLDER / folder)] = wrong
                 break
-            own.append(event)
+            history.append(event)
         else:
-            histories.units.append(own)
+            histories.units.append(history)
 
 
 def _wrong(event: LedgerEntry, folder: str, count: int, name: str) -> str:
@@ -111,7 +111,9 @@ def all_read(top: Place, names: Sequence[str]) -> dict[str, LedgerEntry | str]:
     groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
     out: dict[str, LedgerEntry | str] = {}
     with ThreadPoolExecutor(READERS) as pool:
-        for group, events in zip(groups, pool.map(lambda own: [_read(top, name) for name in own], groups), strict=True):
+        for group, events in zip(
+            groups, pool.map(lambda part: [_read(top, name) for name in part], groups), strict=True
+        ):
             out |= zip(group, events, strict=True)
     return out
 
@@ -134,12 +136,12 @@ def _read(top: Place, name: str) -> LedgerEntry | str:
         return f"cannot be read ({first_line(problem)}); restore it from a copy"
 
 
-def indexed_events(place: Place) -> tuple[dict[str, IndexedEvent], str]:
-    """The index by the place of the event's file, and the state of its seal; empty where the seal is not sound."""
+def indexed_events(path: Place) -> tuple[dict[str, IndexedEvent], str]:
+    """The indexed events by the path of their file, and the state of its seal; empty where the seal is not sound."""
     import pyarrow.parquet as pq
 
     try:
-        data, state = derived.unframed(place)
+        data, state = derived.unframed(path)
     except (OSError, ArchiveUnusable):  # the index does not exist, or cannot be read
         return {}, derived.SOUND
     if state != derived.SOUND:
@@ -161,7 +163,7 @@ def indexed_events(place: Place) -> tuple[dict[str, IndexedEvent], str]:
 
 def _tuples(value: Any) -> Any:
     """Lists as tuples, at any depth."""
-    return tuple(_tuples(one) for one in value) if isinstance(value, list) else value
+    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
 
 
 def _encoded(known: Mapping[str, IndexedEvent]) -> bytes:
@@ -173,7 +175,7 @@ def _encoded(known: Mapping[str, IndexedEvent]) -> bytes:
         "stamp": pa.array([known[name].stamp for name in order], pa.string()),
     }
     for name in NAMES:
-        values = [getattr(known[one].event, name) for one in order]
+        values = [getattr(known[file].event, name) for file in order]
         if name == "sequence":
             columns[name] = pa.array(values, pa.int64())
         else:
@@ -186,7 +188,7 @@ def _encoded(known: Mapping[str, IndexedEvent]) -> bytes:
 
 
 def stamps_of(top: Place) -> dict[str, dict[str, str]]:
-    """Size and time of every event's file: by the first digit of its folder, by its place below ``calibrations``."""
+    """Size and time of every event's file: by the first digit of its folder, by its path below ``calibrations``."""
     out: dict[str, dict[str, str]] = {}
     if isinstance(top, ObjectPath):
         for info in _objects(top):
@@ -204,11 +206,11 @@ def stamps_of(top: Place) -> dict[str, dict[str, str]]:
 
 
 def _packed(top: Path) -> Iterable[tuple[str, str]]:
-    """Places of the packed events, with their sizes and times before they were packed."""
+    """Paths of the packed events, with their sizes and times before they were packed."""
     for folder, packed in top.known.folders(FOLDER).items() if isinstance(top, PackedPath) else ():
         start = folder.removeprefix(f"{FOLDER}/")
-        for name, one in packed.files.items():
-            yield f"{start}/{name}", f"{one.size}.{one.mtime_ns}"
+        for name, member in packed.files.items():
+            yield f"{start}/{name}", f"{member.size}.{member.mtime_ns}"
 
 
 def _of_shard(top: Path, shard: str) -> dict[str, str]:

@@ -19,8 +19,8 @@ def measured_on(run: Run) -> str:
     first = _analysed_again(run)
     if first is not None:
         return day_of(first, f"run {run.id}")
-    own, about = measured_span(run), run.about
-    return day_of(own[1] if own else str(about.get("measured") or about["when"]), f"run {run.id}")
+    span, about = measured_span(run), run.about
+    return day_of(span[1] if span else str(about.get("measured") or about["when"]), f"run {run.id}")
 
 
 def _analysed_again(run: Run) -> str | None:

@@ -19,7 +19,7 @@ SCHEMA = 1
 Event = Literal["begun", "failed", "proved"]
 
 
-def place_of_unit(serial: str) -> str:
+def folder_of_unit(serial: str) -> str:
     """Folder of a unit's journal below the archive's root."""
     return TOP + folder_of(serial).removeprefix("calibrations")
 
@@ -32,13 +32,13 @@ def programming(root: Place, serial: str) -> list[dict[str, Any]]:
     ArchiveUnusable
         An entry is missing or belongs to another unit.
     """
-    folder = root / place_of_unit(serial)
-    places = numbered_files(folder)
-    entries = [files.read_json(place) for place in places]
-    for count, (place, entry) in enumerate(zip(places, entries, strict=True), 1):
-        if place.name != f"{count:06d}.json" or entry.get("serial") != serial:
+    folder = root / folder_of_unit(serial)
+    paths = numbered_files(folder)
+    entries = [files.read_json(path) for path in paths]
+    for count, (path, entry) in enumerate(zip(paths, entries, strict=True), 1):
+        if path.name != f"{count:06d}.json" or entry.get("serial") != serial:
             raise ArchiveUnusable(
-                f"programming: {folder} has entry {place.stem} of unit {entry.get('serial')!r} where entry {count} of {serial!r} "
+                f"programming: {folder} has entry {path.stem} of unit {entry.get('serial')!r} where entry {count} of {serial!r} "
                 "is needed; restore it from a copy"
             )
     return entries
@@ -52,7 +52,7 @@ def add(root: Place, serial: str, event: Event, content: Mapping[str, Any]) -> d
         number = len(known) + 1
         stamp = {key: by[key] for key in ("who", "where", "when")}
         entry = {**content, "serial": serial, "sequence": number, "event": event, **stamp, "schema": SCHEMA}
-        name = f"{place_of_unit(serial)}/{number:06d}.json"
+        name = f"{folder_of_unit(serial)}/{number:06d}.json"
         if files.publish_first(root / name, files.manifest_bytes(entry)):
             sealed = {name: files.sha256(root / name)}
             hash_chain.append(root, TOP, sealed, {**by, "run": str(content.get("run", ""))})

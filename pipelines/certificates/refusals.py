@@ -1,4 +1,4 @@
-"""What the ledger refuses, and why: a strange serial, an overdue standard, dates that are not allowed, and more."""
+"""Refusals of the ledger with their reasons: a strange serial, an overdue standard, dates that are not allowed, and more."""
 
 import re
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ def refuse_serial(serial: str, where: str) -> None:
 
 def refuse_other_device(known: Sequence[Calibration], event: LedgerEntry) -> None:
     """Refuse a serial that the ledger knows as another kind of device, unless those calibrations were revoked."""
-    devices = {one.event.device for one in known if one.state != "revoked"} - {event.device}
+    devices = {calibration.event.device for calibration in known if calibration.state != "revoked"} - {event.device}
     if devices:
         raise WrongUse(
             f"certify: unit {event.serial} of run {event.run} is a device {event.device}, the ledger knows this serial as "
@@ -79,14 +79,16 @@ def nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: in
     Parameters
     ----------
     known : the unit's that hold on any day.
-    certificate : sequence of the one that was meant; 0 for any.
+    certificate : sequence of the certificate that was meant; 0 for any.
     """
     if not known:
         return f"revoke: unit {serial!r} has no calibration that holds, one is needed; see 'tumbleline show' with --at"
-    there = ", ".join(f"{one.certificate} ({one.start} to {one.until})" for one in known)
+    listed = ", ".join(
+        f"{calibration.certificate} ({calibration.start} to {calibration.until})" for calibration in known
+    )
     what = (
         f"certificate {serial}/{certificate}"
         if certificate
         else f"a calibration of unit {serial} after {day or today()}"
     )
-    return f"revoke: there is no {what} that still holds; there are {there}"
+    return f"revoke: there is no {what} that still holds; there are {listed}"

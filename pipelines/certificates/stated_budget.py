@@ -1,4 +1,4 @@
-"""What a certificate states of a unit's uncertainty, from the tables of its run: quantities, decisions, references."""
+"""The uncertainty of a unit in its certificate, from the tables of its run: quantities, decisions, references."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -63,7 +63,7 @@ def stated_budget(run: Run, unit: str) -> StatedBudget:
             for row in sums
         ),
         decisions=tuple(row for row in figures if np.isfinite(edge(row))),
-        references=tuple(Reference.model_validate(one) for one in station.get("reference", [])),
+        references=tuple(Reference.model_validate(reference) for reference in station.get("reference", [])),
     )
 
 

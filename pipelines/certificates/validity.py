@@ -82,7 +82,7 @@ class Calibration:
         return self.start <= day < self.until
 
     def key_values(self) -> list[str]:
-        """What exports and reports state of it: certificate, first day, the day after the last, state, reason of its end."""
+        """The entry of exports and reports: certificate, first day, the day after the last, state, reason of its end."""
         return [self.certificate, self.start, self.until, self.state, self.reason]
 
     def sentence(self) -> str:
@@ -142,12 +142,13 @@ def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersed
     Earlier calibrations end where the new one begins. Later ones are ended only with ``supersede``, because otherwise a
     calibration that is written afterwards would silently replace a newer one.
     """
-    clash = [one for one in known if one.start < one.until and one.start < until and start < one.until]
-    later = [one for one in clash if one.start > start]
+    clash = [old for old in known if old.start < old.until and old.start < until and start < old.until]
+    later = [old for old in clash if old.start > start]
     if later and not supersede:
-        one = later[0]
+        first = later[0]
         raise WrongUse(
-            f"certify: unit {one.serial}: {start} to {until} overlaps calibration {one.certificate} of run {one.run}, valid "
-            f"from {one.start} to {one.until}, and begins before it; choose other dates, or end that calibration with --supersede"
+            f"certify: unit {first.serial}: {start} to {until} overlaps calibration {first.certificate} of run {first.run}, "
+            f"valid from {first.start} to {first.until}, and begins before it; choose other dates, or end that calibration "
+            "with --supersede"
         )
-    return tuple(one.event.sequence for one in clash)
+    return tuple(old.event.sequence for old in clash)

@@ -55,28 +55,29 @@ def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
     ----------
     seen : how many events the unit had then.
     """
-    known = ledger.calibrations(event.serial)
-    for one in known:
-        if not event.ends_others_of(one.event):
+    for other in ledger.calibrations(event.serial):
+        if not event.ends_others_of(other.event):
             continue
-        again = (one.run, one.start, one.until) == (event.run, event.start, event.until)
-        if one.event.sequence > seen and not again and one.start < event.until and event.start < one.until:
+        repeated = (other.run, other.start, other.until) == (event.run, event.start, event.until)
+        if other.event.sequence > seen and not repeated and other.start < event.until and event.start < other.until:
             raise WrongUse(
-                f"certify: unit {event.serial}: certificate {one.certificate} of run {one.run}, valid from {one.start} until "
-                f"{one.until}, was written by {one.event.who} while this command was at work; nothing was certified: look with "
-                f"'tumbleline show {event.serial}', then give the command again if it is to take its place"
+                f"certify: unit {event.serial}: certificate {other.certificate} of run {other.run}, valid from {other.start} "
+                f"until {other.until}, was written by {other.event.who} while this command was at work; nothing was certified: "
+                f"look with 'tumbleline show {event.serial}', then give the command again if it is to take its place"
             )
 
 
 def withdrawn(ledger: Ledger, event: LedgerEntry) -> str:
     """Why a unit is not certified again without a reason of its own: its last certificate of this run was revoked; else empty."""
-    alike = [
-        one for one in ledger.calibrations(event.serial) if one.run == event.run and event.ends_others_of(one.event)
+    known = [
+        calibration
+        for calibration in ledger.calibrations(event.serial)
+        if calibration.run == event.run and event.ends_others_of(calibration.event)
     ]
-    if not alike or not alike[-1].withdrawn:
+    if not known or not known[-1].withdrawn:
         return ""
     return (
-        f"certificate {alike[-1].certificate} of this run was revoked ({alike[-1].reason}); measure the unit again, or, if the "
+        f"certificate {known[-1].certificate} of this run was revoked ({known[-1].reason}); measure the unit again, or, if the "
         f"revocation was an error, certify it with --units {event.serial} --reason TEXT"
     )
 
@@ -129,9 +130,9 @@ def refuse_inadequate(run: Run) -> str:
 
 def _verdict(run: Run) -> AdequacyDocument | None:
     """The verdict on a run's model; an import without one is judged. None where there is nothing to judge."""
-    own = adequacy_of(run)
-    if own is not None:
-        return own
+    verdict = adequacy_of(run)
+    if verdict is not None:
+        return verdict
     if run.about.get("capture") or "dwells" not in run.tables():
         return None
     from pipelines.diagnosis.diagnose import diagnose  # loads the search for effects, which captured runs do not need
@@ -152,13 +153,13 @@ def refuse_contradicted(run: Run) -> str:
     Refused where chance does not explain it: a U from the stated references would be smaller than the run has shown.
     """
     judged = references_of(run)
-    told = "" if judged is None else contradiction(judged)
-    if judged is not None and told and not passes(judged["p_value"] or 0.0, REFUTED_BELOW):
+    text = "" if judged is None else contradiction(judged)
+    if judged is not None and text and not passes(judged["p_value"] or 0.0, REFUTED_BELOW):
         raise WrongUse(
-            f"certify: run {run.id}: {told}; a U from the stated values would be too small, references that hold are needed; "
+            f"certify: run {run.id}: {text}; a U from the stated values would be too small, references that hold are needed; "
             "have the table examined, state in [uncertainty] at least what was found, and measure again"
         )
-    return told
+    return text
 
 
 def refuse_unstated(run: Run) -> None:
@@ -194,10 +195,10 @@ def refuse_unstated(run: Run) -> None:
             f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] (a 0 needs exact = true) and {again}"
         )
     if not run.table("uncertainties")["quantity"].eq("bias_error_period").any():
-        kept = "verification poses" if run.about.get("capture") else "dwells held out by --set verify=N"
+        checks = "verification poses" if run.about.get("capture") else "dwells held out by --set verify=N"
         raise WrongUse(
             f"certify: run {run.id} has no error over the period of validity ({terms.certificate.validity_months} months): state "
-            f"[stability] of the device with a horizon_days that reaches so far, and {kept}, and {again}"
+            f"[stability] of the device with a horizon_days that reaches so far, and {checks}, and {again}"
         )
 
 
@@ -222,18 +223,18 @@ def _needed(run: Run, terms: BudgetTerms) -> tuple[tuple[str, ...], str]:
 
 def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:
     """Refuse a unit that was measured somewhere else at the same time: two units have one serial."""
-    own = measured_span(run)
-    for one in ledger.calibrations(serial):
-        other = Run(run.archive, one.run)
+    span = measured_span(run)
+    for calibration in ledger.calibrations(serial):
+        other = Run(run.archive, calibration.run)
         if (
             other.id == run.id
             or not (other.path / END).is_file()
             or other.about.get("capture") == run.about.get("capture")
         ):
             continue
-        theirs = measured_span(other)
-        if own and theirs and own[0] < theirs[1] and theirs[0] < own[1]:
+        other_span = measured_span(other)
+        if span and other_span and span[0] < other_span[1] and other_span[0] < span[1]:
             raise WrongUse(
-                f"certify: unit {serial} was measured in run {run.id} from {own[0]} to {own[1]} and in run {other.id} from "
-                f"{theirs[0]} to {theirs[1]}: two units have one serial; find out which is which, and give one another"
+                f"certify: unit {serial} was measured in run {run.id} from {span[0]} to {span[1]} and in run {other.id} from "
+                f"{other_span[0]} to {other_span[1]}: two units have one serial; find out which is which, and give one another"
             )

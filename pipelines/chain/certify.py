@@ -42,10 +42,10 @@ IMPORTED = "imported"
 
 @dataclass
 class Certified:
-    """What became of a run's units.
+    """The result of the certification of the units of a run.
 
     written : the events that certify, new in the ledger
-    there : those that were in it already
+    there : events that were in it already
     left_out : why a unit was not certified, by serial
     """
 
@@ -78,9 +78,9 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     units : serials; every unit of the run that passed where empty.
     start : first day, today where empty.
     until : day after the last, so many ``months`` after the first where empty, as many as are allowed where that is 0.
-    reason : kept with the events; units whose certificate of this run was revoked are certified again only by name, with one
+    reason : kept with the events; a unit whose certificate of this run was revoked needs its name and a reason
     supersede : end calibrations that begin later and overlap, too.
-    keys : public keys that are trusted; the own where None. Where there are any the run must be signed by one.
+    keys : trusted public keys; that of the configured private key where None. Where there are keys, one must have signed the run.
 
     Raises
     ------
@@ -102,8 +102,8 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     # one at a time from here on: of two who certify one serial at the same moment the second is refused, and learns of the first
     with alone(ledger.root / FOLDER, wait=True):
         if not (units and reason.strip()):
-            result.left_out |= {one.serial: why for one in proposals if (why := withdrawn(ledger, one))}
-            proposals = [one for one in proposals if one.serial not in result.left_out]
+            result.left_out |= {proposal.serial: why for proposal in proposals if (why := withdrawn(ledger, proposal))}
+            proposals = [proposal for proposal in proposals if proposal.serial not in result.left_out]
             if units and result.left_out:
                 serial, why = next(iter(result.left_out.items()))
                 raise WrongUse(f"certify: unit {serial} of run {run.id}: {why}")
@@ -121,15 +121,15 @@ def certify(  # noqa: PLR0913 - each is an option of the command
 def _proposals(
     run: Run, units: Sequence[str], first: str, last: str, reason: str
 ) -> tuple[list[LedgerEntry], Certified]:
-    """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
+    """The events to be written, and the units left out with the reason; a named unit that may not be certified is refused."""
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
     refuse_overdue(run)
     adequacy = refuse_inadequate(run)
     refuse_unstated(run)
     static = not run.table("coefficients").empty
     comparisons = Comparisons(run)
-    if told := refuse_contradicted(run):
-        adequacy += f"{'; ' if adequacy else ''}{told}"
+    if contradicted := refuse_contradicted(run):
+        adequacy += f"{'; ' if adequacy else ''}{contradicted}"
     about, result = run.about, Certified()
     named = (*EVIDENCE, *(TABLES if comparisons.parts else ()))
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in named))

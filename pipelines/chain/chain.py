@@ -77,8 +77,8 @@ def _reduce(job: Job, run: Run) -> Tables:
 
 def _reduced_with(job: Job) -> dict[str, Any]:
     follows = job.terms.follows
-    own = {} if follows is None else {"supply": follows._asdict()}
-    return {"local_gravity_m_s2": job.recipe.local_gravity_m_s2, **own}
+    supply = {} if follows is None else {"supply": follows._asdict()}
+    return {"local_gravity_m_s2": job.recipe.local_gravity_m_s2, **supply}
 
 
 _converted: dict[tuple[str, str, str], LotTables] = {}
@@ -132,9 +132,9 @@ _BUDGETED = (
 
 def _budget(job: Job, run: Run) -> Tables:
     lot = _lot(run)
-    own = (run.table(name) for name in _BUDGETED[2:])
+    fitted = (run.table(name) for name in _BUDGETED[2:])
     results = run.table("procedure_results")
-    tables = BudgetTables(lot.dwells, lot.history, *own, lot=lot, calibration=None, results=results)
+    tables = BudgetTables(lot.dwells, lot.history, *fitted, lot=lot, calibration=None, results=results)
     return budget(tables, job.terms)
 
 

@@ -30,10 +30,10 @@ def evaluated(
     verdicts, noise : tables of validation and of the static record
     full_scale : by unit, as in :class:`GradeEvidence`
     """
-    made, expected, own = fit_in_memory(lot, job.recipe.effects, family(job.prior))
-    made |= verify_tables(lot, made["coefficients"], made["covariance"], expected, own)
+    made, expected, calibration = fit_in_memory(lot, job.recipe.effects, family(job.prior))
+    made |= verify_tables(lot, made["coefficients"], made["covariance"], expected, calibration)
     names = ("coefficients", "covariance", "verification", "verification_poses")
-    shared: dict[str, Any] = {**{name: made[name] for name in names}, "noise": noise, "calibration": own}
+    shared: dict[str, Any] = {**{name: made[name] for name in names}, "noise": noise, "calibration": calibration}
     tables = BudgetTables(lot.dwells, lot.history, wander=made["wander"], prior=made["prior"], lot=lot, **shared)
     stated = decision_budget(tables, job.terms)
     evidence = GradeEvidence(verdicts, residuals=made["residuals"], budget=stated, full_scale=full_scale, **shared)

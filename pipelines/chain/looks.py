@@ -64,18 +64,18 @@ class LotLooks:
         self._due = {dwells[count - 1] for count in look_counts(self._activities, job.station, job.recipe)}
 
     def due(self, record: int) -> bool:
-        """Whether the records are looked at after this one."""
+        """Whether the records so far are evaluated after this record."""
         return record in self._due
 
-    def look(self, record: int, told: frozenset[str]) -> Look:
-        """What the records up to this one say."""
+    def look(self, record: int, reported: frozenset[str]) -> Look:
+        """The evaluation of the records up to this record."""
         with threadpool_limits(1):
             try:
-                return self._look(record, told)
+                return self._look(record, reported)
             except (TumblelineError, InertialError) as problem:
                 return Look(known=False, text=f"cannot be judged yet: {problem}")
 
-    def _look(self, record: int, told: frozenset[str]) -> Look:
+    def _look(self, record: int, reported: frozenset[str]) -> Look:
         state = _Evaluated(self.job, self._readings(), self._summary(), self.records.gathered("history"))
         if not state.units:
             return Look(known=False, text="no unit is fitted")
@@ -87,10 +87,10 @@ class LotLooks:
                 "coverage_factor": over_looks(limits.coverage_factor, looks) * guard,
             }
         )
-        own, guarded = (grade(state.evidence, rule, zero_g) for rule in (limits, wide))
+        plain, guarded = (grade(state.evidence, rule, zero_g) for rule in (limits, wide))
         fails = _failing(guarded["figures"])
-        figures = _open_figures(own["figures"], guarded["figures"], limits, state.units)
-        passed = set(own["grades"].query("outcome == 'pass'")["unit"]) - figures.keys()
+        figures = _open_figures(plain["figures"], guarded["figures"], limits, state.units)
+        passed = set(plain["grades"].query("outcome == 'pass'")["unit"]) - figures.keys()
         ratio = limits.coverage_factor * state.ratios(self.terms.asked, zero_g)
         fitted = dict(zip(state.units, ratio.tolist(), strict=True))
         reached = {unit for unit, share in fitted.items() if guard * share <= 1.0}
@@ -98,11 +98,11 @@ class LotLooks:
         ratios = [share for unit, share in fitted.items() if unit not in fails]
         worst = max(ratios, default=0.0)
         asked = _share(worst, guard, others=bool(fails)) if self.terms.asked and ratios else ""
-        lost = len(own["grades"]) - len(fitted)
+        lost = len(plain["grades"]) - len(fitted)
         not_fitted = f", {lost} not fitted" if lost else ""
         decided = f"{len(fitted) - len(undecided)} of {len(fitted)} units decided{not_fitted}"
         text = f"{asked}{decided}{_most_often(figures, undecided)}"
-        new = {unit: sentence for unit, sentence in fails.items() if unit not in told}
+        new = {unit: sentence for unit, sentence in fails.items() if unit not in reported}
         missing = "" if undecided else self._missing(record, state)
         if undecided or missing:
             return Look(
@@ -114,7 +114,7 @@ class LotLooks:
         return Look(known=True, text=text, fails=new, given_up=self._given_up(record))
 
     def _missing(self, record: int, state: "_Evaluated") -> str:
-        """What else is needed before the lot may end, with a leading semicolon; empty where nothing is."""
+        """The reason why the lot may not end yet, with a leading semicolon; empty where it may."""
         if self.terms.visible:
             effects = self.job.recipe.effects
             rows = visibilities(self._state(record), effects, 1.0, self.terms.visible)
@@ -209,15 +209,15 @@ class _Evaluated:
 
 
 def _open_figures(
-    own: pd.DataFrame, guarded: pd.DataFrame, limits: Limits, units: Sequence[str]
+    plain: pd.DataFrame, guarded: pd.DataFrame, limits: Limits, units: Sequence[str]
 ) -> dict[str, frozenset[str]]:
-    """Limited figures of the dwells that do not pass, by unit: coefficients by the guarded rule, verification by the limits' own.
+    """Limited figures of the dwells that do not pass, by unit: coefficients by the guarded rule, verification by the plain rule.
 
     Further dwells of the fit hardly change a figure of verification, so that looks do not give it more chances to pass.
     """
     needed = BEFORE_THE_RECORD & limits.figures.keys()
     of_fit = guarded[guarded["figure"].isin(list(OF_COEFFICIENTS))]
-    of_checks = own[~own["figure"].isin(list(OF_COEFFICIENTS))]
+    of_checks = plain[~plain["figure"].isin(list(OF_COEFFICIENTS))]
     rows = pd.concat([of_fit, of_checks]).query("outcome == 'pass'")
     left = {unit: frozenset(needed - set(rows.loc[rows["unit"] == unit, "figure"])) for unit in units}
     return {unit: names for unit, names in left.items() if names}
@@ -241,8 +241,8 @@ def _failing(figures: pd.DataFrame) -> dict[str, str]:
 
 
 def _failed(figures: pd.DataFrame) -> Iterator[tuple[str, str]]:
-    own = figures[(figures["outcome"] == "fail") & figures["figure"].isin(list(OF_COEFFICIENTS))]
-    for row in own.to_dict("records"):
+    failed = figures[(figures["outcome"] == "fail") & figures["figure"].isin(list(OF_COEFFICIENTS))]
+    for row in failed.to_dict("records"):
         unit = "" if row["unit_text"] == "1" else f" {row['unit_text']}"
         yield (
             str(row["unit"]),

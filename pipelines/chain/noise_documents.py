@@ -60,18 +60,18 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
     terms = without_digits(limits_where_unexplained(curve, fitted), coarse, series.rate_hz)
     explained = fitted.p_value >= UNEXPLAINED_P
     names = [series.names[k] for k in alive]
-    told = [disturbance_texts(found, series.rate_hz, series.unit) for found in disturbed]
+    found_texts = [disturbance_texts(found, series.rate_hz, series.unit) for found in disturbed]
     notes = [series.recognised] if series.recognised else []
     notes += [f"{series.names[k]}: the output never changes" for k in range(len(series.names)) if k not in alive]
     notes += [
         f"{name}: {text}"
-        for name, own in zip(names, coarse, strict=True)
-        if (text := remark(own, series.unit or "of the output's unit"))
+        for name, digits in zip(names, coarse, strict=True)
+        if (text := remark(digits, series.unit or "of the output's unit"))
     ]
     notes += [
         f"{name}: {', '.join(texts) if texts else 'no mixture of the five terms explains the curve'}"
         f"{'' if known else '; the limits are what the whole curve allows'}"
-        for name, known, texts in zip(names, explained, told, strict=True)
+        for name, known, texts in zip(names, explained, found_texts, strict=True)
         if texts or not known
     ]
     shown, unit, about, model = curve, series.unit, ALLAN, model_deviation(terms, curve.tau)
@@ -105,10 +105,10 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
         "navigation": _navigation_rows(rows, series.unit),
         "disturbances": [
             {
-                "channel": name, "kind": one.kind, "start_s": one.start / series.rate_hz, "stop_s": one.stop / series.rate_hz,
-                "count": one.count, "size": one.size,
+                "channel": name, "kind": event.kind, "start_s": event.start / series.rate_hz,
+                "stop_s": event.stop / series.rate_hz, "count": event.count, "size": event.size,
             }
-            for name, found in zip(names, disturbed, strict=True) for one in found
+            for name, found in zip(names, disturbed, strict=True) for event in found
         ],
         "notes": notes,
     }  # fmt: skip
@@ -129,17 +129,17 @@ def _navigation_rows(terms: list[dict[str, Any]], unit: str) -> list[NavigationR
     for row in terms:
         by_channel.setdefault(row["channel"], {})[row["term"]] = row["value"] if row["identified"] else None
     made: list[NavigationRow] = []
-    for channel, own in by_channel.items():
-        if all(own.get(name) is None for name in "NBK"):
+    for channel, values in by_channel.items():
+        if all(values.get(name) is None for name in "NBK"):
             continue
-        error = navigation_error(own, unit, np.array(TIMES_S))
+        error = navigation_error(values, unit, np.array(TIMES_S))
         made.append(
             {
                 "channel": channel,
                 "velocity_random_walk_m_s_rth": error.velocity_random_walk,
                 "q_n_m2_s4_Hz": error.q_n,
                 "q_b_m2_s4": error.q_b,
-                "not_identified": [name for name in "NBK" if own.get(name) is None],
+                "not_identified": [name for name in "NBK" if values.get(name) is None],
                 "time_s": list(TIMES_S),
                 "velocity_m_s": error.velocity.tolist(),
                 "position_m": error.position.tolist(),
@@ -148,13 +148,13 @@ def _navigation_rows(terms: list[dict[str, Any]], unit: str) -> list[NavigationR
     return made
 
 
-def _term_rows(channel: str, terms: NoiseTerms, place: int, unit: str) -> list[dict[str, Any]]:
+def _term_rows(channel: str, terms: NoiseTerms, index: int, unit: str) -> list[dict[str, Any]]:
     return [
         {
             "channel": channel, "term": symbol, "name": term.name, "value": term.value, "low": term.low,
             "high": term.high, "identified": term.identified, "unit": term.unit.format(unit or "unit"),
         }
-        for symbol, term in terms.one(place).items()
+        for symbol, term in terms.one(index).items()
     ]  # fmt: skip
 
 
@@ -174,9 +174,9 @@ def allan_of_run(run: Run) -> dict[str, Any]:
     readings = run.table("readings")
     static = readings[readings["kind"] == "allan"]
     channels = []
-    for (unit, axis), own in curves.groupby(["unit", "axis"], sort=False):
-        curve = {name: own[column].tolist() for name, column in CURVE.items()}
-        fitted = own["fitted_ug"].tolist() if own["fitted_ug"].notna().all() else None
+    for (unit, axis), points in curves.groupby(["unit", "axis"], sort=False):
+        curve = {name: points[column].tolist() for name, column in CURVE.items()}
+        fitted = points["fitted_ug"].tolist() if points["fitted_ug"].notna().all() else None
         channels.append({"channel": f"{unit} {axis}", **curve, "fitted": fitted})
     rows = [
         {
@@ -220,7 +220,7 @@ def statistic_of_run(run: Run, spacing: str, statistic: str) -> dict[str, Any]:
         allan_document(
             EvenSeries(
                 tuple(f"{channel.unit} {channel.axis}" for channel in channels),
-                np.stack([one.record for one in channels]),
+                np.stack([channel.record for channel in channels]),
                 record.rate_hz / record.size,
                 "µg",
                 document["source"],
@@ -282,8 +282,8 @@ def psd_document(series: EvenSeries, segment: int | None = None) -> dict[str, An
             *filter(None, [series.recognised]),
             *(
                 f"{name}: {', '.join(texts)}"
-                for name, own in zip(series.names, series.values, strict=True)
-                if (texts := disturbance_texts(disturbances(own), series.rate_hz, series.unit))
+                for name, values in zip(series.names, series.values, strict=True)
+                if (texts := disturbance_texts(disturbances(values), series.rate_hz, series.unit))
             ),
             *(
                 f"{name}: a line at {frequency:.5g} Hz, {rms:.3g} {series.unit} rms".rstrip()

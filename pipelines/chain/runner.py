@@ -26,7 +26,7 @@ from schemas.progress import Progress, silent
 
 @dataclass(frozen=True)
 class Done:
-    """What became of one stage: whether its output was there already, and how long it took."""
+    """The result of a stage: whether its output was there already, and its duration, s."""
 
     stage: str
     reused: bool
@@ -53,20 +53,20 @@ def from_station(job: Job, records: Records, progress: Progress, before: Records
 
 
 def captured_tables(records: Records) -> dict[str, pd.DataFrame]:
-    """What a run keeps of its capture besides the samples: readings, temperatures against time, soaks, what happened."""
+    """The tables of a run from its capture, without samples: readings, temperatures against time, soaks, events."""
     tables = {"events": records.events.table(), "soaks": records.events.soaks()}
     return {**tables, **{name: records.gathered(name) for name in ("readings", "history")}}
 
 
 def decisive(job: Job) -> dict[str, Any]:
-    """What the result of a job depends on; the report only shows it and may be made anew in its place."""
+    """Everything that the result of a job depends on; not the report, which only shows it and may be made again."""
     code = {stage.name: code_hash(stage.name) for stage in BY_NAME.values()}
     about = {key: value for key, value in job.about.items() if key != "station"}
     return {**about, "code": code}
 
 
 def _origin(job: Job, archive: Archive) -> dict[str, str]:
-    """The run of which a new one analyses the data again, where another run has measured them; the new one is no measurement."""
+    """The run that measured the data of a job, where the capture is complete already: the new run is then a re-analysis."""
     if not archive.capture(job.capture_id).is_complete():
         return {}
     first = archive.first_run_of(job.capture_id, [unit.serial for unit in job.lot.units])

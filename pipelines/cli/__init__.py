@@ -72,9 +72,9 @@ def find_commands(folder: Path) -> dict[str, CommandModule]:
         if command is not None:
             commands[path.stem.removesuffix("_")] = command
     ordered = sorted(commands.items(), key=lambda item: item[1].order)
-    for (first, one), (second, other) in pairwise(ordered):
-        if one.order == other.order:
-            raise IncompleteCommand(f"{second}.py: ORDER is {one.order}, as in {first}.py; choose another number")
+    for (first, earlier), (second, later) in pairwise(ordered):
+        if earlier.order == later.order:
+            raise IncompleteCommand(f"{second}.py: ORDER is {earlier.order}, as in {first}.py; choose another number")
     return dict(ordered)
 
 
@@ -111,18 +111,18 @@ class _OnDemand(TyperCommand):
 
     def _load(self) -> Command:
         module = import_module(f"{__name__}.{self._module}")
-        own = getattr(module, "app", None)
-        if own is None:
-            own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-            own.command(self.name)(module.command)
-        command = typer.main.get_command(own)
+        application = getattr(module, "app", None)
+        if application is None:
+            application = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+            application.command(self.name)(module.command)
+        command = typer.main.get_command(application)
         from pipelines.cli.candidates import attach
 
         attach(command)
-        for one in (command, *getattr(command, "commands", {}).values()):
-            one.help = flowing(one.help or "")
-            _name_arguments_once(one)
-            take_texts_as_given(one)
+        for cli_command in (command, *getattr(command, "commands", {}).values()):
+            cli_command.help = flowing(cli_command.help or "")
+            _name_arguments_once(cli_command)
+            take_texts_as_given(cli_command)
         command.epilog = _examples(getattr(module, "EXAMPLES", ()), getattr(module, "EPILOG", ()))
         of_subcommands: dict[str, tuple[str, ...]] = getattr(module, "EXAMPLES_OF", {})
         for name, examples in of_subcommands.items():
@@ -135,11 +135,11 @@ def _name_arguments_once(command: Command) -> None:
 
     typer puts braces around those that are needed, and brackets around names that have them.
     """
-    for one in command.params:
-        stated = getattr(one, "metavar", None)
-        if stated and one.param_type_name == "argument":
-            shown_name = stated if one.required or stated.startswith("[") else f"[{stated}]"
-            setattr(one, "get_usage_pieces", lambda _context, name=shown_name: [name])  # noqa: B010 - a method of the class
+    for parameter in command.params:
+        stated = getattr(parameter, "metavar", None)
+        if stated and parameter.param_type_name == "argument":
+            shown_name = stated if parameter.required or stated.startswith("[") else f"[{stated}]"
+            setattr(parameter, "get_usage_pieces", lambda _context, name=shown_name: [name])  # noqa: B010 - a method of the class
 
 
 def flowing(text: str) -> str:
@@ -318,8 +318,8 @@ def take_texts_as_given(command: Command) -> None:
 
     def parameters(ctx: Context) -> list[Parameter]:
         found = stated(ctx)
-        for one in found:
-            _take_as_given(one)
+        for parameter in found:
+            _take_as_given(parameter)
         return found
 
     setattr(command, "get_params", parameters)  # noqa: B010 - a method of the class
@@ -331,5 +331,5 @@ def _take_as_given(parameter: Parameter) -> None:
     if described is None or convert is None or "get_runtime_param" in vars(parameter):
         return
     text = described.annotation is str and described.parameter_info.parser is None
-    own = _AsGiven(convert, text=text)
-    setattr(parameter, "get_runtime_param", lambda: own)  # noqa: B010 - a method of the class
+    as_given = _AsGiven(convert, text=text)
+    setattr(parameter, "get_runtime_param", lambda: as_given)  # noqa: B010 - a method of the class

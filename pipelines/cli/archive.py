@@ -77,7 +77,7 @@ def key(
     from pipelines.archive import signatures
 
     refuse_standard_output(output, "archive key", "a private key is never printed")
-    path = output or (signatures.key_place() if public else signatures.default_key_place())
+    path = output or (signatures.key_file() if public else signatures.default_key_file())
     if path is None:
         raise WrongUse("archive key: no key exists, one is needed; make it with 'tumbleline archive key'")
     if public:

@@ -73,7 +73,7 @@ def _styled(outcome: str, grade: str) -> Text:
 def _reason(row: dict[str, Any]) -> str:
     """The reasons that only one of the runs gives."""
     before, after = (set(filter(None, plain_reason(text).split("; "))) for text in row["reasons"])
-    gone, new = (sorted(one.split(":")[0] for one in part) for part in (before - after, after - before))
+    gone, new = (sorted(reason.split(":")[0] for reason in part) for part in (before - after, after - before))
     changes = [f"now {name}" for name in new] + [f"no longer {name}" for name in gone if name not in new]
     return "; ".join(changes)
 
@@ -81,7 +81,7 @@ def _reason(row: dict[str, Any]) -> str:
 def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, most: int | None) -> None:
     if not rows:
         return
-    both = [row for row in rows if not (math.isnan(row["a"]) or math.isnan(row["b"]))]
+    common = [row for row in rows if not (math.isnan(row["a"]) or math.isnan(row["b"]))]
     lines = [
         [
             str(row["unit"]),
@@ -90,12 +90,12 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
             f"{short(row['change'])} {row['unit_text']}",
             *(short(row[over], 2) for over in ("over_a", "over_b")),
         ]
-        for row in both[:most]
+        for row in common[:most]
     ]
     if lines:
         heads = ["unit", what, "a", "b", "change", "over\nu(a)", "over\nu(b)"]
-        title = f"{what}: {len(both)} differ, largest change relative to the uncertainty first"
-        print_table(heads, lines, title=title, whole=2)
+        title = f"{what}: {len(common)} differ, largest change relative to the uncertainty first"
+        print_table(heads, lines, title=title, fixed=2)
     new, gone = _apart(rows, "b"), _apart(rows, "a")
     for side, names in (("only in b", new), ("only in a", gone)):
         if names:

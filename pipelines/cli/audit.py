@@ -75,12 +75,12 @@ def _refuse_nothing(audited: Audit, root: str) -> None:
     """Refuse an unknown name, and an archive without calibrations before the day."""
     import numpy as np
 
-    for switch, name, there in (
+    for switch, name, values in (
         ("--device", audited.scope.device.upper(), audited.all.device),
         ("--station", audited.scope.station, audited.all.station),
     ):
-        if name and len(audited.all) and name not in there:
-            known = [str(one) for one in np.unique(there.astype(str))]
+        if name and len(audited.all) and name not in values:
+            known = [str(label) for label in np.unique(values.astype(str))]
             raise WrongUse(f"audit: {switch} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
     if not len(audited.all) and not audited.problems:
         raise WrongUse(

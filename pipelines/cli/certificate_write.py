@@ -43,9 +43,9 @@ def write(
     file, _, password = sign_with.partition(",")
     key = read_key(Path(file), Path(password) if password else None) if sign_with else None
     done = issue(Archive(archive), names, who, output, key=key, address=address)
-    lines = [f"certificate {one.number}: {one.pdf}, {one.xml}" for one in done.written]
-    kept = ("serial", "run", "pdf", "xml", "signature")
-    written = [{"certificate": one.number, **{key: getattr(one, key) for key in kept}} for one in done.written]
+    lines = [f"certificate {entry.number}: {entry.pdf}, {entry.xml}" for entry in done.written]
+    fields = ("serial", "run", "pdf", "xml", "signature")
+    written = [{"certificate": entry.number, **{key: getattr(entry, key) for key in fields}} for entry in done.written]
     give({"certificates": written, "left_out": done.left_out}, lines, as_json=as_json)
     for serial, why in done.left_out.items():
         remark(f"certificate: {serial}: {why}")

@@ -88,7 +88,7 @@ def command(
     name, _, unit = calibration.partition(":")
     time, named = options.mapped_outputs(columns)
     given = options.settings(setting, SETTINGS, "correct")
-    forces = [one for one in track or () if one != AT_REST]
+    forces = [value for value in track or () if value != AT_REST]
     if len(forces) > 1 or (NOT in forces and len(track or ()) > 1):
         raise WrongUse(f"correct: --track {' and '.join(track or ())}, one of them is needed; leave the others out")
     store = Archive(archive)
@@ -166,10 +166,10 @@ def _print(show: Callable[..., None], document: CorrectDocument) -> None:
     if document["outside_temperature"]:
         low, high = document["temperatures_C"]
         show(f"{document['outside_temperature']} samples are outside the measured {low:.1f} to {high:.1f} °C", "yellow")
-    if (one := document["filter"]) is not None:
+    if (used := document["filter"]) is not None:
         show(
-            f"filter: {one['kind']}, {len(one['numerator'])} coefficients, -3 dB at {one['cutoff_hz']:.4g} Hz "
-            f"({one['cutoff_from']}), delay {1e3 * one['delay_s']:.3g} ms, noise bandwidth {one['noise_bandwidth_hz']:.4g} Hz"
+            f"filter: {used['kind']}, {len(used['numerator'])} coefficients, -3 dB at {used['cutoff_hz']:.4g} Hz "
+            f"({used['cutoff_from']}), delay {1e3 * used['delay_s']:.3g} ms, noise bandwidth {used['noise_bandwidth_hz']:.4g} Hz"
         )
     if document["bias"] is not None:
         _print_bias(document["bias"], show)

@@ -117,7 +117,7 @@ def diagnosed(
 
 
 def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
-    """The recipe that dwells were measured with: the one given, else the one of the run.
+    """The recipe that dwells were measured with: the given recipe, else that of the run.
 
     Raises WrongUse: neither a file of dwells nor an import states its recipe, and none is named.
     """

@@ -41,7 +41,7 @@ def _show(document: DoctorDocument) -> None:
         [c.part, c.check, Text(c.state, COLOURS[c.state]), c.found if c.state == "good" else "see below"]
         for c in checks
     ]
-    print_table(["part", "check", "state", "found"], lines, whole=3)
+    print_table(["part", "check", "state", "found"], lines, fixed=3)
     if document["samples"]:
         say(f"sample recipes and stations: {document['samples']}")
     for state in ("not configured", "warning", "fault"):

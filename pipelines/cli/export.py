@@ -210,7 +210,9 @@ def _print_certificates(
     from pipelines.stages.uncertainty.budget_terms import archived_terms
 
     given, day = {c.unit for c in chosen}, today()
-    lines = [f"left out: {unit}, {one.sentence()}" for unit, one in revoked_units(run).items() if unit not in given]
+    lines = [
+        f"left out: {unit}, {revoked.sentence()}" for unit, revoked in revoked_units(run).items() if unit not in given
+    ]
     lines += [
         f"{c.unit}: {c.certified}"
         for c in chosen

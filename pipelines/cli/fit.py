@@ -44,9 +44,9 @@ def command(
     from pipelines.jobs.job import job_of_run
 
     if Path(run).is_file():
-        whole = shlex.quote(run) if run.isprintable() else shown(run)  # a line to paste is not shortened
+        quoted = shlex.quote(run) if run.isprintable() else shown(run)  # a line to paste is not shortened
         raise WrongUse(
-            f"fit: '{shown(run)}' is a file, a run of the archive is needed; 'tumbleline compare {whole}' fits dwells in a "
+            f"fit: '{shown(run)}' is a file, a run of the archive is needed; 'tumbleline compare {quoted}' fits dwells in a "
             "file, 'tumbleline import' brings a recording into the archive"
         )
     store = Archive(archive)

@@ -126,18 +126,18 @@ def present(words: Sequence[str]) -> list[str]:
     while rest:
         word = rest.pop(0)
         if word == "--":
-            line.kept += [word, *rest]
+            line.middle += [word, *rest]
             break
         option, equals, value = word.partition("=")
         new = _rule(rules, option, value if equals else next(iter(rest), ""))
         if new is None:
-            line.kept.append(word)
+            line.middle.append(word)
         elif "{}" in new:
             line.put(new, value if equals or not rest else rest.pop(0))
         elif " " in new or not new:
             line.front += new.split()
         else:
-            line.kept.append(f"{new}{equals}{value}")
+            line.middle.append(f"{new}{equals}{value}")
     return [*path, *line.words()]
 
 
@@ -145,27 +145,27 @@ class _Line:
     """The words behind the name of a command: constants, those that stay in their place, new arguments, texts to add."""
 
     def __init__(self) -> None:
-        self.front, self.kept, self.behind, self.added = list[str](), list[str](), list[str](), list[list[str]]()
+        self.front, self.middle, self.behind, self.added = list[str](), list[str](), list[str](), list[list[str]]()
 
     def put(self, new: str, value: str) -> None:
-        """What stands for an option with a value."""
+        """Put the present words for a former option with a value."""
         text = new.replace("{}", value)
         if text.startswith("+"):
             self.added.append(text[1:].split(" ", 1))
         elif text.startswith("-"):
-            self.kept += text.split(" ", 1)
+            self.middle += text.split(" ", 1)
         else:
             self.behind.append(text)
 
     def words(self) -> list[str]:
-        """All of them."""
+        """All words of the command line."""
         for option, text in self.added:
-            _add(self.kept, option, text)
-        return [*self.front, *self.kept, *self.behind]
+            _add(self.middle, option, text)
+        return [*self.front, *self.middle, *self.behind]
 
 
 def _rule(rules: dict[str, str], option: str, value: str) -> str | None:
-    """What an option of the version before is now; None for an option that is present."""
+    """The present words for a former option; None for an option that exists."""
     for stated, new in rules.items():
         name, _, pattern = stated.partition(" ")
         if name == option and (not pattern or fnmatchcase(value, pattern)):
@@ -175,11 +175,11 @@ def _rule(rules: dict[str, str], option: str, value: str) -> str | None:
 
 def _add(words: list[str], option: str, text: str) -> None:
     """Add a text to the value of an option, which is appended where it is not there."""
-    for place, word in enumerate(words):
-        if word == option and place + 1 < len(words):
-            words[place + 1] += text
+    for index, word in enumerate(words):
+        if word == option and index + 1 < len(words):
+            words[index + 1] += text
             return
         if word.startswith(f"{option}="):
-            words[place] += text
+            words[index] += text
             return
     words += [option, text]

@@ -75,7 +75,7 @@ def _print(rows: list[VersionDocument], name: str, removes: Callable[[str], str]
     changes = [
         [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
     ]
-    print_table(["version", "change", "by", "when", "why"], changes, title=f"Versions of {name}", whole=2)
+    print_table(["version", "change", "by", "when", "why"], changes, title=f"Versions of {name}", fixed=2)
     if rows[0]["fitted_ug"] is None:
         return
     fresh = rows[0]["fresh_ug"] is not None

@@ -158,7 +158,7 @@ def command(
     sets = [files] if keys.get("join") else [[path] for path in files]
     working, where = error_console().status, str(file or "import")
     imports = [import_document(paths, keys, where, fit, archive, stated, working) for paths in sets]
-    verdicts = [one["adequate"] for one in imports if one["fit"]]
+    verdicts = [imported["adequate"] for imported in imports if imported["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     document = imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate}
     show = partial(_print_imports, imports, archive, list_dwells=list_dwells)
@@ -196,7 +196,7 @@ def _transfer(
     layout = stated_layout(*stated)
     imported = [import_transfer(path, unit, model, archive, layout) for path in files]
     document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
-    passed = all(one["adequate"] is True for one in imported)
+    passed = all(transfer["adequate"] is True for transfer in imported)
     conclude(document, lambda _: _print_transfers(imported), as_json=as_json, passed=passed)
 
 
@@ -230,11 +230,11 @@ def _waveforms(
 
 
 def _print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
-    for one in imports:
-        say(f"{one['unit']}: {one['points']} points, kept as run {one['run']}")
-        for line in one["text"]:
+    for transfer in imports:
+        say(f"{transfer['unit']}: {transfer['points']} points, kept as run {transfer['run']}")
+        for line in transfer["text"]:
             say(f"  {line}")
-        print_verdict_of_fit(one["adequate"], "the model does not describe these points")
+        print_verdict_of_fit(transfer["adequate"], "the model does not describe these points")
 
 
 def _print_waveforms(imported: Mapping[str, Any]) -> None:
@@ -251,7 +251,7 @@ def _print_waveforms(imported: Mapping[str, Any]) -> None:
         if figure["identified"]
     ]
     if rows:
-        print_table(["figure", "axis", "value", "standard uncertainty", "unit"], rows, whole=2)
+        print_table(["figure", "axis", "value", "standard uncertainty", "unit"], rows, fixed=2)
     for line in imported["text"]:
         say(f"  {line}")
     if imported["verdict"]:
@@ -260,19 +260,19 @@ def _print_waveforms(imported: Mapping[str, Any]) -> None:
 
 
 def _print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: object, *, list_dwells: bool) -> None:
-    for one in imports:
-        dwells = number_of(one["dwells"], "dwell")
-        rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
-        unit = one["out_unit"] or "a unit that is not known (--unit-of output=… states it)"
-        say(f"{', '.join(one['units'])}: {rows} in {unit}, kept as run {one['run']}")
-        for remark in [*one["remarks"], *one["lines"]]:
+    for imported in imports:
+        dwells = number_of(imported["dwells"], "dwell")
+        rows = f"{number_of(imported['samples'], 'sample')}, {dwells}" if imported["samples"] else dwells
+        unit = imported["out_unit"] or "a unit that is not known (--unit-of output=… states it)"
+        say(f"{', '.join(imported['units'])}: {rows} in {unit}, kept as run {imported['run']}")
+        for remark in [*imported["remarks"], *imported["lines"]]:
             say(f"  {remark}")
         if list_dwells:
-            _print_dwells(one["dwell_list"], one["out_unit"])
-        if one["fit"]:
-            print_verdict_of_fit(one["adequate"], "this fit does not describe these data")
-            if one["fit"] == "norm" and one["adequate"] is False:
-                print_next([command_line("diagnose", one["run"], *archive_words(archive))])
+            _print_dwells(imported["dwell_list"], imported["out_unit"])
+        if imported["fit"]:
+            print_verdict_of_fit(imported["adequate"], "this fit does not describe these data")
+            if imported["fit"] == "norm" and imported["adequate"] is False:
+                print_next([command_line("diagnose", imported["run"], *archive_words(archive))])
 
 
 def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:
@@ -294,5 +294,5 @@ def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:
             ]
             for dwell in dwells
         ],
-        whole=2,
+        fixed=2,
     )

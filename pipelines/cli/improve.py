@@ -120,11 +120,12 @@ def command(
     improvement = Improvement(data, tables, model, target, beside, who, fresh, attendant)
     document = improvement.run(judged, list(names_in(choose)), yes=yes)
     given = Given(archive, fresh, fresh_temperatures, leave_out, effect_file or ())
-    kept = [*(["--output", str(output)] if output else []), *(["--who", who] if who else [])]
-    document["next"] = next_lines(document, (model, target), partial(judged_data, data, beside, given), given, kept)
+    repeated = [*(["--output", str(output)] if output else []), *(["--who", who] if who else [])]
+    document["next"] = next_lines(document, (model, target), partial(judged_data, data, beside, given), given, repeated)
     if recording is not None:
         document["recording"] = recording
-        document["next"] = next_of_recording(document, recording, given, ["--model", str(model)] if model else [], kept)
+        options_of_model = ["--model", str(model)] if model else []
+        document["next"] = next_of_recording(document, recording, given, options_of_model, repeated)
     show = print_recording if brief else print_improvement
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 
@@ -169,8 +170,8 @@ class _Terminal(Attendant):
 
         question = f"Add {effect} to {target}?"
         if others:
-            alike = ", ".join(others)
-            question = f"These data do not separate {effect} from {alike}. Add the first, {effect}, to {target}?"
+            listed = ", ".join(others)
+            question = f"These data do not separate {effect} from {listed}. Add the first, {effect}, to {target}?"
         return agreed(question, CHOICES, UNATTENDED)
 
     def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:

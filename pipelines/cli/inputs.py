@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
     """The dwells of a file or run, and their temperatures against time where there are any.
 
-    history : a file; empty for the run's own, or for the one beside a file of dwells
+    history : a file; empty for the history of the run, or for the file beside a file of dwells
     """
     from pipelines.diagnosis import inputs
 
@@ -59,7 +59,7 @@ def add_effects(files: Sequence[Path] | None, formulas: Sequence[str] | None = N
 
 
 def distribution(store: Archive, runs: Sequence[str], dask: str, workers: int | None) -> tuple[Distributor | None, int]:
-    """How the work on runs is distributed over Dask, None for processes of this machine; and the number of processes."""
+    """The function that distributes work over Dask, None for processes of this machine; and the number of processes."""
     from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
 
@@ -71,7 +71,7 @@ def distribution(store: Archive, runs: Sequence[str], dask: str, workers: int | 
 def both_runs(
     dwells: str, history: str, fresh: str, fresh_history: str, archive: str | None
 ) -> tuple[pd.DataFrame, pd.DataFrame | None, pd.DataFrame | None, pd.DataFrame | None]:
-    """Dwells and history of a run, then those of the fresh one where it is named."""
+    """Dwells and history of a run, then those of the fresh run where it is named."""
     first, temperatures = dwells_and_history(dwells, history, archive)
     again, again_temperatures = dwells_and_history(fresh, fresh_history, archive) if fresh else (None, None)
     return first, temperatures, again, again_temperatures

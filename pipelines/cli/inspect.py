@@ -66,9 +66,9 @@ def command(
     if picture or page:
         _write(inspections[0], picture, page)
     documents = [inspection.document for inspection in inspections]
-    whole = documents[0] if len(documents) == 1 else {"inspections": documents}
+    result = documents[0] if len(documents) == 1 else {"inspections": documents}
     passed = not any(document["open"] for document in documents)
-    conclude(whole, lambda _: _print_all(documents), as_json=as_json, passed=passed)
+    conclude(result, lambda _: _print_all(documents), as_json=as_json, passed=passed)
 
 
 def _print_all(documents: list[InspectDocument]) -> None:
@@ -97,39 +97,39 @@ def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> N
         publish(page, recording.page(inspection), "page")
 
 
-def _print(one: InspectDocument) -> None:
-    names = " + ".join(Path(name).name for name in one["files"])
-    rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
-    long = "" if one["duration_s"] is None else f", {one['duration_s']:.5g} s"
-    say(f"{names}: {one['form']}, {one['rows']} rows{rate}{long}")
-    for remark in one["remarks"]:
+def _print(document: InspectDocument) -> None:
+    names = " + ".join(Path(name).name for name in document["files"])
+    rate = "" if document["rate_hz"] is None else f", {document['rate_hz']:.5g} Hz"
+    long = "" if document["duration_s"] is None else f", {document['duration_s']:.5g} s"
+    say(f"{names}: {document['form']}, {document['rows']} rows{rate}{long}")
+    for remark in document["remarks"]:
         say(f"  {remark}")
-    _print_columns(one)
-    if one["output_unit"]:
-        say(f"  output in {one['output_unit']}: {one['output_reason']}")
-    if one["time_unit"]:
-        say(f"  time in {one['time_unit']}: {one['time_reason']}")
-    if one["gaps"]:
-        say(f"  {number_of(one['gaps'], 'gap')} in time longer than five samples")
-    for column in one["columns"]:
+    _print_columns(document)
+    if document["output_unit"]:
+        say(f"  output in {document['output_unit']}: {document['output_reason']}")
+    if document["time_unit"]:
+        say(f"  time in {document['time_unit']}: {document['time_reason']}")
+    if document["gaps"]:
+        say(f"  {number_of(document['gaps'], 'gap')} in time longer than five samples")
+    for column in document["columns"]:
         if column["clipped"] and column["low"] is not None and column["high"] is not None:
             say(
                 f"  axis {column['meaning']} is clipped: {number_of(column['clipped'], 'sample')} in runs at the end of its "
                 f"range ({column['low']:g} to {column['high']:g}); the true output is beyond"
             )
-    for fault in one["faults"][:MOST_FAULTS]:
+    for fault in document["faults"][:MOST_FAULTS]:
         what = "is constant" if fault["fault"] == "stuck_output" else "has torn words"
         say(f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on")
-    more = len(one["faults"]) - MOST_FAULTS
+    more = len(document["faults"]) - MOST_FAULTS
     if more > 0:
         say(f"  and {more} more such faults")
-    _print_intervals(one)
-    for text in one["open"]:
+    _print_intervals(document)
+    for text in document["open"]:
         say(f"  to be added by you: {text}")
-    say(one["command"])
+    say(document["command"])
 
 
-def _print_columns(one: InspectDocument) -> None:
+def _print_columns(document: InspectDocument) -> None:
     rows = [
         [
             str(column["number"]),
@@ -141,14 +141,14 @@ def _print_columns(one: InspectDocument) -> None:
             str(column["clipped"] or ""),
             str(column["missing"] or ""),
         ]
-        for column in one["columns"]
+        for column in document["columns"]
     ]
     heads = ["no.", "column", "meaning", "reason", "unit", "lowest", "highest", "resolution", "clipped", "no number"]
-    print_table(heads, rows, whole=2)
+    print_table(heads, rows, fixed=2)
 
 
-def _print_intervals(one: InspectDocument) -> None:
-    intervals = one["intervals"]
+def _print_intervals(document: InspectDocument) -> None:
+    intervals = document["intervals"]
     if not intervals:
         return
     total = sum(interval["end_s"] - interval["start_s"] for interval in intervals)

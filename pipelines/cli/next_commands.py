@@ -88,12 +88,12 @@ def command_line(*words: str) -> str:
 
 
 def archive_words(archive: str | None) -> list[str]:
-    """The option that names an archive; none for the default one."""
+    """The option that names an archive; none for the default archive."""
     return ["--archive", str(archive)] if archive else []
 
 
 def judged_data(source: str, history: str, given: Given) -> JudgedData:
-    """The data of a command, with a fresh run: the one given, beside a file, or the one that an archive holds or will hold.
+    """The data of a command, with a fresh run: as given, beside a file, or the run that an archive holds or will hold.
 
     history : the file of temperatures against time that was read; empty where there was none
     """
@@ -124,7 +124,7 @@ def judged_data(source: str, history: str, given: Given) -> JudgedData:
 def extension(
     file: Path | str, effects: Sequence[str], judged: Sequence[str], data: JudgedData, *, new: bool
 ) -> list[str]:
-    """The commands that add effects to a model file, and the one that shows the errors of its versions.
+    """The commands that add effects to a model file, and the command that shows the errors of its versions.
 
     judged : the model that was judged; a new file begins with it
     new : whether the file does not exist yet
@@ -132,15 +132,15 @@ def extension(
     start = ["--effects", ",".join(judged), *data.given.written] if new else []
     lines = [
         command_line(
-            "extend", str(file), name, *(start if place == 0 else []), "--dwells", data.source, *data.given.effects
+            "extend", str(file), name, *(start if number == 0 else []), "--dwells", data.source, *data.given.effects
         )
-        for place, name in enumerate(effects)
+        for number, name in enumerate(effects)
     ]
     return [*lines, *fresh_measurement(file, data)]
 
 
 def fresh_measurement(file: Path | str, data: JudgedData) -> list[str]:
-    """The command that measures the units again, where that is possible and not done, and the one that shows the errors."""
+    """The command that measures the units again, where that is possible and not done, and the command that shows the errors."""
     return [*([command_line(*data.measure)] if data.measure else []), versions(file, data)]
 
 
@@ -170,8 +170,8 @@ def print_next_of_diagnosis(document: DiagnosisDocument, find: FindData, model: 
     data = find()
     lines: list[str] = []
     if decides and data.refusal is not None:  # dwells of a file do not state the recipe that they were measured with
-        own = ["--model", str(model)] if model else ["--effects", ",".join(document["effects"])]
-        lines.append(command_line("diagnose", data.source, *own, *data.options, "--output", free_name("next")))
+        model_option = ["--model", str(model)] if model else ["--effects", ",".join(document["effects"])]
+        lines.append(command_line("diagnose", data.source, *model_option, *data.options, "--output", free_name("next")))
     elif decides:
         say(
             "To write these steps as a recipe, add --output FILE.toml --recipe RECIPE, the recipe of these dwells.",
@@ -211,7 +211,7 @@ def free_name(stem: str = "model") -> str:
 
 
 def fit_refusal(run: Run, effects: Sequence[str]) -> str:
-    """What a run's recipe lacks to fit a model, and why its dwells show the model none the less; empty where it lacks nothing."""
+    """Why the recipe of a run cannot fit a model that its dwells show; empty where it can."""
     from pipelines.jobs.job import job_of_run
     from pipelines.planning.context import with_verification_hint
     from pipelines.planning.plan import missing

@@ -126,7 +126,7 @@ def _print_terms(document: dict[str, Any]) -> None:
 
 
 def _print_navigation(rows: list[dict[str, Any]]) -> None:
-    """What the identified terms do to velocity and position without aiding."""
+    """Print the errors of velocity and position without aiding that follow from the identified terms."""
     if not rows:
         return
     shown = [rows[0]["time_s"].index(time) for time in SHOWN_S]

@@ -187,7 +187,7 @@ def cheapest_recipe(
     return best, optimum_document(best, base, name)
 
 
-def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str:
+def written(best: Optimum, target: Path, home: Path, document: dict[str, Any]) -> str:
     """The text of the recipe file at ``target``.
 
     home : folder of the recipe that the search started from
@@ -197,8 +197,8 @@ def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str
     remarks = [
         f"Written by 'tumbleline plan optimise' for station {best.planned.station.name}.",
         (
-            f"Station time: {own['minutes']['total']:.0f} min; {own['from']}: {own['own_minutes']['total']:.0f} min; "
-            f"textbook plan: {own['textbook_minutes']['total']:.0f} min."
+            f"Station time: {document['minutes']['total']:.0f} min; {document['from']}: "
+            f"{document['own_minutes']['total']:.0f} min; textbook plan: {document['textbook_minutes']['total']:.0f} min."
         ),
         f"{_reached(best)}.",
     ]
@@ -206,7 +206,7 @@ def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str
 
 
 def missing_limits(recipe: Recipe, home: Path) -> str:
-    """What is missing where the limits of a recipe cannot be read from its folder; empty where they can."""
+    """A warning where the limits of a recipe cannot be read from its folder; else empty."""
     try:
         load_limits(recipe, home)
     except TumblelineError as problem:

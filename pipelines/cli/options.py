@@ -71,7 +71,7 @@ def filter_of(text: str) -> tuple[str, float | None]:
 
 
 def included(given: Sequence[str] | None) -> dict[str, bool]:
-    """Which units ``--include`` adds: ``failed`` and ``revoked``, each whether it is named.
+    """The units that ``--include`` adds: ``failed`` and ``revoked``, each whether it is named.
 
     Raises WrongUse: another word.
     """
@@ -100,7 +100,7 @@ def yes(text: str) -> bool:
 
 def set_option(keys: Mapping[str, Setting], text: str = "Further settings; may be repeated.") -> Any:
     """The option ``--set``, whose help lists its keys."""
-    lines = [f"{key}={one.notation}: {one.text}." for key, one in keys.items()]
+    lines = [f"{key}={setting.notation}: {setting.text}." for key, setting in keys.items()]
 
     def offered(incomplete: str) -> list[str]:
         return [f"{key}=" for key in keys if key.startswith(incomplete)]

@@ -148,7 +148,7 @@ def plan_recipe(
 
 
 def _warned(messages: list[str]) -> list[str]:
-    """What 'tumbleline run' refuses in the recipe, said."""
+    """Print why 'tumbleline run' refuses the recipe."""
     for message in messages:
         remark(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
     return messages

@@ -82,12 +82,12 @@ def _print(document: ChoiceDocument) -> None:
 
 def _shown(rows: list[ChoiceRow]) -> list[ChoiceRow]:
     """The rows without those of a device that no calibration mends, but for one."""
-    told: set[str] = set()
+    printed: set[str] = set()
     shown: list[ChoiceRow] = []
     for row in rows:
         if not row["cannot"]:
             shown.append(row)
-        elif row["device"] not in told:
-            told.add(row["device"])
+        elif row["device"] not in printed:
+            printed.add(row["device"])
             shown.append({**row, "calibration": "any"})
     return shown

@@ -46,7 +46,7 @@ def line_schedule(
     contents = {kind: line_csv(document) if kind == CSV else _drawn(document, path) for kind, path in made.items()}
     for kind, path in made.items():
         publish(path, contents[kind], kind)
-    give(document, lambda one: _print(one, everything=everything), as_json=as_json)
+    give(document, lambda schedule: _print(schedule, everything=everything), as_json=as_json)
 
 
 def _drawn(document: LineDocument, path: Path) -> bytes:

@@ -79,8 +79,8 @@ def _print(document: OrderDocument, text: str) -> None:
         return
     heat = ", ".join(f"{t:g}" for t in document["temperatures_C"])
     until, before = (
-        NOT_REACHED if known is None else "only at its end" if known >= whole else f"{known:.0f} min"
-        for known, whole in (
+        NOT_REACHED if known is None else "only at its end" if known >= total else f"{known:.0f} min"
+        for known, total in (
             (document["known_minutes"], document["minutes"]),
             (document["given_known_minutes"], document["given_minutes"]),
         )

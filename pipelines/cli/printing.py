@@ -89,13 +89,13 @@ def print_table(
     lines: Sequence[Sequence[str | Text]],
     title: str = "",
     *,
-    whole: int = 1,
+    fixed: int = 1,
     out: Console | None = None,
 ) -> None:
     """A table for people; numbers stand to the right.
 
-    Neither they nor the first ``whole`` columns are ever broken or cut. A column without any entry is left out. A table that
-    needs more than the terminal has narrower gaps, or continues below with its other columns, the first ``whole`` repeated;
+    Neither they nor the first ``fixed`` columns are ever broken or cut. A column without any entry is left out. A table that
+    needs more than the terminal has narrower gaps, or continues below with its other columns, the first ``fixed`` repeated;
     in a pipe it is as wide as it needs to be.
     """
     from pipelines.cli.console import limited
@@ -104,12 +104,12 @@ def print_table(
     width = shown.width if limited(shown) else None
     cells = ([line[k] for line in lines] for k in range(len(columns)))
     made = [
-        _Column(head, own, kept=k < whole, in_pipe=width is None)
-        for k, (head, own) in enumerate(zip(columns, cells, strict=True))
+        _Column(head, texts, fixed=k < fixed, in_pipe=width is None)
+        for k, (head, texts) in enumerate(zip(columns, cells, strict=True))
     ]
-    used = [one for k, one in enumerate(made) if k < whole or not lines or one.filled]
-    gap = min(GAPS, key=lambda one: (len(_parts(used, whole, width, one)), -one))
-    for part in _parts(used, whole, width, gap):
+    used = [column for k, column in enumerate(made) if k < fixed or not lines or column.filled]
+    gap = min(GAPS, key=lambda gap: (len(_parts(used, fixed, width, gap)), -gap))
+    for part in _parts(used, fixed, width, gap):
         _print_part(shown, part, title, gap)
         title = ""
 
@@ -120,33 +120,33 @@ GAPS = (3, 2)  # characters between two columns; the second where it saves a con
 class _Column:
     """A column of a table, with the characters that it needs at least and at most.
 
-    Numbers, and a column that is ``kept``, need their longest line, others their longest word. Words longer than any name are
+    Numbers, and a column that is ``fixed``, need their longest line, others their longest word. Words longer than any name are
     broken, but not in a pipe, which has no width.
     """
 
-    def __init__(self, head: str, cells: Sequence[str | Text], *, kept: bool, in_pipe: bool) -> None:
+    def __init__(self, head: str, cells: Sequence[str | Text], *, fixed: bool, in_pipe: bool) -> None:
         texts = [str(cell) for cell in cells]
         lines = [line for text in (head, *texts) for line in text.splitlines()]
         longest_word = max((len(word) for line in lines for word in line.split(" ")), default=0)
         self.head, self.cells, self.filled = head, cells, any(text.strip() for text in texts)
         self.numeric = bool(texts) and all(map(_is_number, texts))
-        self.kept = kept or self.numeric
+        self.fixed = fixed or self.numeric
         self.most = max(map(len, lines), default=0)
-        self.least = self.most if self.kept else longest_word if in_pipe else min(longest_word, NARROW)
+        self.least = self.most if self.fixed else longest_word if in_pipe else min(longest_word, NARROW)
 
 
-def _parts(columns: Sequence[_Column], whole: int, width: int | None, gap: int) -> list[list[_Column]]:
-    """The columns in portions that fit a width, each with the first ``whole`` ones."""
+def _parts(columns: Sequence[_Column], fixed: int, width: int | None, gap: int) -> list[list[_Column]]:
+    """The columns in portions that fit a width, each with the first ``fixed`` ones."""
     if width is None:
         return [list(columns)]
-    head = list(columns[:whole])
-    parts, own = list[list[_Column]](), list(head)
-    for one in columns[whole:]:
-        if len(own) > len(head) and sum(column.least + gap for column in [*own, one]) + 1 > width:
-            parts.append(own)
-            own = list(head)
-        own.append(one)
-    return [*parts, own]
+    head = list(columns[:fixed])
+    parts, portion = list[list[_Column]](), list(head)
+    for column in columns[fixed:]:
+        if len(portion) > len(head) and sum(member.least + gap for member in [*portion, column]) + 1 > width:
+            parts.append(portion)
+            portion = list(head)
+        portion.append(column)
+    return [*parts, portion]
 
 
 def _print_part(shown: Console, columns: Sequence[_Column], title: str, gap: int) -> None:
@@ -155,9 +155,9 @@ def _print_part(shown: Console, columns: Sequence[_Column], title: str, gap: int
 
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, gap - 2))
     widths = _widths(columns, shown.width - 1 - gap * len(columns))
-    for one, width in zip(columns, widths, strict=True):
-        justify = "right" if one.numeric else "left"
-        table.add_column(one.head, justify=justify, overflow="fold", no_wrap=one.kept, width=width)
+    for column, width in zip(columns, widths, strict=True):
+        justify = "right" if column.numeric else "left"
+        table.add_column(column.head, justify=justify, overflow="fold", no_wrap=column.fixed, width=width)
     for line in zip(*(column.cells for column in columns), strict=True):
         table.add_row(*line)
     table.width = sum(widths) + gap * len(widths) + 1
@@ -169,7 +169,7 @@ def _print_part(shown: Console, columns: Sequence[_Column], title: str, gap: int
 def _widths(columns: Sequence[_Column], room: int) -> list[int]:
     """Widths between what columns need at least and at most; room is given to the narrowest of those that want more."""
     widths = [column.least for column in columns]
-    while sum(widths) < room and (wanting := [k for k, one in enumerate(columns) if widths[k] < one.most]):
+    while sum(widths) < room and (wanting := [k for k, column in enumerate(columns) if widths[k] < column.most]):
         widths[min(wanting, key=lambda k: widths[k])] += 1
     return widths
 

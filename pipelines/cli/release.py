@@ -82,7 +82,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
 
     records = releases(store)
     now = datetime.now(UTC)
-    valid = {one.number for one in records if released(store, one.device, one.station, now) == one}
+    valid = {record.number for record in records if released(store, record.device, record.station, now) == record}
     rows = [{**record.document(), "in_use": record.number in valid} for record in records]
     give({"archive": str(store.root), "releases": rows}, lambda _: _print(store, records, valid), as_json=as_json)
 
@@ -95,7 +95,7 @@ def _print(store: Archive, records: list[Release], valid: set[int]) -> None:
         [str(r.number), _name(r), _where(r), f"{r.since:%Y-%m-%d}", "yes" if r.number in valid else "", r.who]
         for r in records
     ]
-    print_table(["no.", "model", "for", "from", "in use", "by"], lines, whole=4)
+    print_table(["no.", "model", "for", "from", "in use", "by"], lines, fixed=4)
     for record in records:
         say(f"  {record.number}: {record.reason}{' (forced)' if record.forced else ''}")
 

@@ -50,7 +50,7 @@ def _print(document: dict[str, Any]) -> None:
     rows = [(f"{row['device']} on {row['station']}", row) for row in document["groups"]]
     lines = [line for name, row in [*rows, ("all", document["total"])] for line in _lines(name, row)]
     heads = ["device", "model", "units", "yield", "fit\nµg", "not\nfitted\nµg", "later\nrun\nµg"]
-    print_table(heads, lines, title=title, whole=2)
+    print_table(heads, lines, title=title, fixed=2)
     for key, outcome in (("to_fail", "fail with the new model only"), ("to_pass", "pass with the new model only")):
         rows = document["flips"][key]
         if rows:

@@ -69,10 +69,10 @@ def command(
         found = map_partitions(function, portions, distribute, workers=count, name=f"rerun of {counted}")
     done: list[Any] = [outcome for portion in found for outcome in portion]
     if check:
-        same = sum(result.same for result in done)
+        reproduced = sum(result.same for result in done)
         rows = [asdict(result) for result in done]
-        checks = {"archive": str(store.root), "selected": len(done), "same": same, "runs": rows}
-        conclude(checks, lambda _: _print_check(done), as_json=as_json, passed=same == len(done))
+        checks = {"archive": str(store.root), "selected": len(done), "same": reproduced, "runs": rows}
+        conclude(checks, lambda _: _print_check(done), as_json=as_json, passed=reproduced == len(done))
     add_runs(store, [outcome.new for outcome in done if outcome.new])
     document = {"archive": str(store.root), "runs": done, **_counts(done)}
     conclude(document, partial(_print, done, archive), as_json=as_json, passed=not document["failed"])
@@ -80,26 +80,29 @@ def command(
 
 def _counts(outcomes: list[RerunOutcome]) -> dict[str, int]:
     failed = sum(bool(outcome.error) for outcome in outcomes)
-    anew = sum(bool(one.new) and one.new != one.run for one in outcomes)
+    anew = sum(bool(outcome.new) and outcome.new != outcome.run for outcome in outcomes)
     return {"selected": len(outcomes), "rerun": anew, "unchanged": len(outcomes) - anew - failed, "failed": failed}
 
 
 def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str, Any]) -> None:
     lines = [_line(outcome) for outcome in outcomes[:SHOWN] if not outcome.error]
     if lines:
-        print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
+        print_table(["run", "re-run", "changed", "stages computed"], lines, fixed=2)
     if len(outcomes) > SHOWN:
         say(f"… and {len(outcomes) - SHOWN} more; --json lists all", style="dim")
-    for one in outcomes:
-        if one.error:
-            say(f"  {one.run}: {one.error}", style="bold red")
+    for outcome in outcomes:
+        if outcome.error:
+            say(f"  {outcome.run}: {outcome.error}", style="bold red")
     say(
         f"{document['selected']} selected: {document['rerun']} re-analysed, {document['unchanged']} unchanged, "
         f"{document['failed']} failed"
     )
-    anew = [one for one in outcomes if one.new and one.new != one.run and not one.error]
+    anew = [outcome for outcome in outcomes if outcome.new and outcome.new != outcome.run and not outcome.error]
     print_next(
-        [command_line("archive", "diff", one.run, one.new, *archive_words(archive)) for one in anew[:DIFFERENCES]]
+        [
+            command_line("archive", "diff", outcome.run, outcome.new, *archive_words(archive))
+            for outcome in anew[:DIFFERENCES]
+        ]
     )
 
 
@@ -116,21 +119,21 @@ def _line(outcome: RerunOutcome) -> list[str]:
 
 def _print_check(results: list[Reproduction]) -> None:
     tables = 0
-    for one in results:
-        tables += sum(how == "same bytes" for how in one.tables.values())
-        for line in [one.error] if one.error else one.differences:
-            say(f"  {one.run}: {line}", style="bold red")
-        if one.differences:
+    for result in results:
+        tables += sum(how == "same bytes" for how in result.tables.values())
+        for line in [result.error] if result.error else result.differences:
+            say(f"  {result.run}: {line}", style="bold red")
+        if result.differences:
             unknown = "neither code nor libraries; the computer differs or the stored file is damaged"
-            say(f"    changed since: {', '.join(one.changed) or unknown}")
+            say(f"    changed since: {', '.join(result.changed) or unknown}")
     left = sum(how == "not checked" for result in results for how in result.tables.values())
-    same = sum(one.same for one in results)
+    reproduced = sum(result.same for result in results)
     say(
-        f"{same} of {number_of(len(results), 'run')} reproduced: {number_of(tables, 'table')} with the same bytes",
+        f"{reproduced} of {number_of(len(results), 'run')} reproduced: {number_of(tables, 'table')} with the same bytes",
         style="bold",
     )
     if left:
         say(f"{number_of(left, 'table')} not checked: the raw samples for them are not in the archive", style="dim")
-    changes = sorted({change for one in results if one.same for change in one.changed})
+    changes = sorted({change for result in results if result.same for change in result.changed})
     if changes:
         say(f"changed since, without effect on the tables: {', '.join(changes)}", style="dim")

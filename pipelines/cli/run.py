@@ -104,8 +104,8 @@ def command(
         lines = [_next(run, document, archive) for run, document in zip(runs, documents, strict=True)]
         print_next([*chain.from_iterable(lines)])
 
-    whole = documents[0] if len(documents) == 1 else {"fillings": documents}
-    conclude(whole, show, as_json=as_json, passed=all(map(all_passed, documents)))
+    result = documents[0] if len(documents) == 1 else {"fillings": documents}
+    conclude(result, show, as_json=as_json, passed=all(map(all_passed, documents)))
 
 
 def refuse_recorded(jobs: list[Job], store: Archive, *, replays: bool) -> None:
@@ -127,13 +127,13 @@ def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
     """The commands after a run: what its model lacks or its plan cannot show, and its certificates where they can be given."""
     from pipelines.cli.next_commands import archive_words, command_line
 
-    own = [run.id, *archive_words(archive)]
-    lines = [command_line("diagnose", *own)] if document["adequacy"] is not None else []
+    words = [run.id, *archive_words(archive)]
+    lines = [command_line("diagnose", *words)] if document["adequacy"] is not None else []
     adequate = document["adequacy"] is None or document["adequacy"]["adequate"] is not False
     certain = adequate and any(
         unit["outcome"] == "pass" and unit.get("basis") == "budget" for unit in document["units"]
     )
-    return [*lines, command_line("certificate", "issue", *own)] if certain else lines
+    return [*lines, command_line("certificate", "issue", *words)] if certain else lines
 
 
 def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -> Run:
@@ -177,7 +177,7 @@ DOES = {
     "grade": "deciding by the limits",
     "report": "drawing the report",
 }
-"""What each stage does, for the progress line."""
+"""The action of each stage, for the progress line."""
 
 
 @contextmanager

@@ -15,22 +15,22 @@ PATIENCE_S = 2  # open streams would hold up the end of a server
 
 
 def page_server(
-    app: ASGIApp, place: LimitedSocket, certificate: Path | None = None, key: Path | None = None
+    app: ASGIApp, listener: LimitedSocket, certificate: Path | None = None, key: Path | None = None
 ) -> uvicorn.Server:
     """The server of an application on a socket that is open already; with HTTPS where a certificate and its key are given."""
     config = uvicorn.Config(
-        TimedRequests(app, place.connections), log_level="warning", access_log=False, server_header=False, ws="none",
+        TimedRequests(app, listener.connections), log_level="warning", access_log=False, server_header=False, ws="none",
         timeout_graceful_shutdown=PATIENCE_S, ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=False,
     )  # fmt: skip
     return uvicorn.Server(config)
 
 
-def run_until_stopped(server: uvicorn.Server, place: LimitedSocket, command: str) -> None:
+def run_until_stopped(server: uvicorn.Server, listener: LimitedSocket, command: str) -> None:
     """Serve until Ctrl-C, which is how these commands end, then say so in one line."""
     logging.getLogger("uvicorn.error").addFilter(_not_cancelled)
     try:
         with suppress(KeyboardInterrupt):  # the server has ended by it, and mostly raises it again
-            server.run(sockets=[place])
+            server.run(sockets=[listener])
         remark(f"{command}: ended")
     finally:
         logging.getLogger("uvicorn.error").removeFilter(_not_cancelled)

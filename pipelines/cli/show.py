@@ -27,7 +27,7 @@ NOTES = {
         "measurement: bias_record_u_ug of the table wander"
     )
 }
-"""What the columns of a table mean where their names alone mislead."""
+"""Meaning of the columns of a table whose names alone mislead."""
 
 
 def command(
@@ -156,13 +156,13 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
             f"show: unit {serial!r} has no calibration in archive {archive.root}; certify one with 'tumbleline certificate issue'"
         )
     # of a unit that has coefficients, and results of an exciter, the coefficients are meant
-    first = sorted(history, key=lambda one: STATIC not in one.event.covers.split())
-    valid = next((one for one in first if one.holds(day)), None)
+    first = sorted(history, key=lambda calibration: STATIC not in calibration.event.covers.split())
+    valid = next((calibration for calibration in first if calibration.holds(day)), None)
     if as_json:
         shown = None if valid is None else {**valid.document(), **_made(archive, valid)}
         print_json(
             {"unit": serial, "at": day, "valid": valid is not None, "calibration": shown,
-             "history": [one.document() for one in history]}
+             "history": [calibration.document() for calibration in history]}
         )  # fmt: skip
     else:
         _print(serial, day, valid, history, {} if valid is None else _made(archive, valid))
@@ -199,8 +199,8 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
             say(f"  code     {made['made']['code'][:16]}… with {libraries}")
     lines = [
-        [one.certificate, one.event.covers, one.start, one.until, _state(one, day), one.run, _why(one)]
-        for one in history
+        [entry.certificate, entry.event.covers, entry.start, entry.until, _state(entry, day), entry.run, _why(entry)]
+        for entry in history
     ]
     print_table(["certificate", "covers", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []

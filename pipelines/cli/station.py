@@ -121,8 +121,8 @@ def _of_runs(store: Archive, run: str) -> list[dict[str, Any]]:
     """Events of the captures of the archive, each once, under the name of the first run that used it."""
     runs = [store.run(run)] if run else [store.run(info.id) for info in store.runs()]
     captures: dict[str, str] = {}
-    for one in runs:
-        captures.setdefault(str(one.about.get("capture") or ""), one.id)
+    for stored in runs:
+        captures.setdefault(str(stored.about.get("capture") or ""), stored.id)
     return [
         {"where": run_id, **event}
         for capture, run_id in captures.items()
@@ -151,7 +151,7 @@ def _of_machine() -> list[dict[str, Any]]:
 
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 SETTINGS = re.compile(r"[,:;(]| with | behind ")
-"""What stands between the name of a model and the required settings of the device."""
+"""Words between the name of a model and the required settings of the device."""
 
 
 SERVING = {
@@ -210,7 +210,7 @@ def profiles(
         profile = load_profile(name)
         give(profile.model_dump(mode="json"), lambda _: _print_profile(profile), as_json=as_json)
         return
-    loaded = [load_profile(one) for one in profile_names()]
+    loaded = [load_profile(profile_name) for profile_name in profile_names()]
     heads = ["profile", "kind", "device", "links", "verified"]
     lines = [
         [

@@ -205,11 +205,11 @@ def replay(
     from stations.recordings.other_programs import read_recording
     from stations.recordings.replay_server import ReplayServer
 
-    recording, stop, told = read_recording(file), stopped(), set[str]()
+    recording, stop, reported = read_recording(file), stopped(), set[str]()
 
     def new(request: str) -> None:
-        if request not in told:
-            told.add(request)
+        if request not in reported:
+            reported.add(request)
             remark(f"asked something new: {request}", style="yellow")
 
     with ReplayServer(recording, host, port, speed, new) as server:
@@ -223,7 +223,7 @@ def replay(
         stop.wait()
         answered = server.replay.answered
     remark(f"{answered} requests answered, {len(server.replay.asked_anew)} new")
-    raise typer.Exit(STATION if told else 0)
+    raise typer.Exit(STATION if reported else 0)
 
 
 def _print_frames(total: int, document: FramesDocument) -> None:

@@ -83,8 +83,8 @@ def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits
     from pipelines.monitoring.service import alerting, application
     from pipelines.serving.connections import listening_socket
 
-    place = listening_socket(host, port, "monitor")
-    say(f"http://{host}:{place.getsockname()[1]}/healthz")
+    listener = listening_socket(host, port, "monitor")
+    say(f"http://{host}:{listener.getsockname()[1]}/healthz")
     sys.stdout.flush()  # a program that started it waits for the address
-    with place, alerting(monitor, poster, audits) if poster is not None else nullcontext():
-        run_until_stopped(page_server(application(monitor), place), place, "monitor")
+    with listener, alerting(monitor, poster, audits) if poster is not None else nullcontext():
+        run_until_stopped(page_server(application(monitor), listener), listener, "monitor")

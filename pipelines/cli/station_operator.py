@@ -28,16 +28,16 @@ def operator(
     _reach(archive)
     from pipelines.flows.operator import answer, waiting
 
-    matches = [one for one in waiting() if one.name.startswith(run) or one.id.startswith(run)]
+    matches = [flow_run for flow_run in waiting() if flow_run.name.startswith(run) or flow_run.id.startswith(run)]
     reply: Answer | None = "go" if answered == "go" else "stop" if answered else None
     if reply is not None:
         if len(matches) != 1:
-            names = ", ".join(one.name for one in matches) or "none"
+            names = ", ".join(flow_run.name for flow_run in matches) or "none"
             raise WrongUse(
                 f"operator: {len(matches)} waiting runs begin with '{run}' ({names}), one is needed; give more of its name"
             )
         answer(matches[0].id, reply)
-    give({"waiting": [vars(one) for one in matches], "answered": reply}, _print, as_json=as_json)
+    give({"waiting": [vars(flow_run) for flow_run in matches], "answered": reply}, _print, as_json=as_json)
 
 
 def _print(document: dict[str, Any]) -> None:
@@ -45,7 +45,7 @@ def _print(document: dict[str, Any]) -> None:
     if reply is not None:
         say(f"{waiting[0]['name']}: {'continues' if reply == 'go' else 'stops'}")
     elif waiting:
-        print_table(["run", "asks"], [[one["name"], one["question"]] for one in waiting])
+        print_table(["run", "asks"], [[flow_run["name"], flow_run["question"]] for flow_run in waiting])
     else:
         say("no run waits for the operator")
 

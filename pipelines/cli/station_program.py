@@ -99,15 +99,18 @@ def _write_teds(
     stated = data_sheet(sheet, measured_on(source))
     outcomes = program_teds(source, chosen, config, stated, lambda text: remark(f"program: {text}"))
     give({"run": source.id, "teds": [outcome.document() for outcome in outcomes]}, _print_teds, as_json=as_json)
-    raise typer.Exit(PART_FAILED if any(one.outcome != "proved" for one in outcomes) else DONE)
+    raise typer.Exit(PART_FAILED if any(outcome.outcome != "proved" for outcome in outcomes) else DONE)
 
 
 def _print_teds(result: dict[str, Any]) -> None:
-    rows = [[one["unit"], one["outcome"], ", ".join(page["axis"] for page in one["pages"])] for one in result["teds"]]
+    rows = [
+        [sheet["unit"], sheet["outcome"], ", ".join(page["axis"] for page in sheet["pages"])]
+        for sheet in result["teds"]
+    ]
     print_table(["unit", "outcome", "pages"], rows, title=f"run {result['run']}: TEDS")
-    for one in result["teds"]:
-        if one["outcome"] == "failed":
-            say(f"  {one['unit']} failed at '{one['step']}': {one['reason']}")
+    for sheet in result["teds"]:
+        if sheet["outcome"] == "failed":
+            say(f"  {sheet['unit']} failed at '{sheet['step']}': {sheet['reason']}")
 
 
 def _agreed(run: str, station: str, chosen: Sequence[tuple[int, UnitCalibration]]) -> bool:
@@ -121,21 +124,21 @@ def _agreed(run: str, station: str, chosen: Sequence[tuple[int, UnitCalibration]
 
 def _print(result: dict[str, Any]) -> None:
     rows = []
-    for one in result["units"]:
-        worst = max((abs(error) for pose in one["poses"] for error in pose["error_ug"]), default=None)
+    for unit in result["units"]:
+        worst = max((abs(error) for pose in unit["poses"] for error in pose["error_ug"]), default=None)
         rows.append(
             [
-                one["unit"],
-                one["outcome"],
-                one["copy"] if one["sequence"] else "",
-                "" if one["sequence"] is None else str(one["sequence"]),
-                one["crc32"] if one["sequence"] else "",
+                unit["unit"],
+                unit["outcome"],
+                unit["copy"] if unit["sequence"] else "",
+                "" if unit["sequence"] is None else str(unit["sequence"]),
+                unit["crc32"] if unit["sequence"] else "",
                 "" if worst is None else f"{worst:.0f}",
-                one["certificate"] or "not certified",
+                unit["certificate"] or "not certified",
             ]
         )
     heads = ["unit", "outcome", "copy", "sequence", "CRC-32", "largest error, µg", "certificate"]
     print_table(heads, rows, title=f"run {result['run']}")
-    for one in result["units"]:
-        if one["outcome"] == "failed":
-            say(f"  {one['unit']} failed at '{one['step']}': {one['reason']}")
+    for unit in result["units"]:
+        if unit["outcome"] == "failed":
+            say(f"  {unit['unit']} failed at '{unit['step']}': {unit['reason']}")

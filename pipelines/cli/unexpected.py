@@ -20,9 +20,9 @@ _SECRET = re.compile(r"//[^/@\s]+@")
 
 
 def write_report(problem: Exception) -> str:
-    """Write the report; return one line with the kind of the exception and the place of the report."""
-    place = _place(problem)
-    what = f"unexpected {type(problem).__name__} in {place} ({reason(problem)})"
+    """Write the report; return one line with the kind of the exception and the path of the report."""
+    location = _location(problem)
+    what = f"unexpected {type(problem).__name__} in {location} ({reason(problem)})"
     report = _written(_report(problem))
     if os.environ.get(VARIABLE):
         sys.stderr.write("".join(traceback.format_exception(problem)))
@@ -33,12 +33,12 @@ def write_report(problem: Exception) -> str:
     return f"{what}: a defect of the program, not of its input; {where}"
 
 
-def _place(problem: Exception) -> str:
+def _location(problem: Exception) -> str:
     """File and line of this program that the exception passed last."""
     root = Path(__file__).resolve().parents[2]
     frames = traceback.extract_tb(problem.__traceback__)
-    own = [f for f in frames if Path(f.filename).is_relative_to(root) and "site-packages" not in f.filename]
-    last = (own or frames or [None])[-1]
+    inside = [f for f in frames if Path(f.filename).is_relative_to(root) and "site-packages" not in f.filename]
+    last = (inside or frames or [None])[-1]
     if last is None:
         return "the command line"
     path = Path(last.filename)

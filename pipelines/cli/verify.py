@@ -59,7 +59,7 @@ def command(
     from pipelines.integrity import verify
 
     if files := certificate_files(runs or ()):
-        check_certificates(files, [Path(one) for one in trust or ()], archive, laboratory, as_json=as_json)
+        check_certificates(files, [Path(path) for path in trust or ()], archive, laboratory, as_json=as_json)
     if laboratory:
         raise WrongUse(
             "--laboratory: no file of a certificate is given, one is needed; give FILE.pdf or FILE.xml, or leave it out"
@@ -141,9 +141,9 @@ def check_certificates(
         store.refuse_none()
     against = Against(trusted, store, archive is not None, who)
     done = [check_file(path, against) for path in files]
-    accepted = all(one.accepted for one in done)
-    document = {"files": [_document(one) for one in done], "accepted": accepted}
-    conclude(document, lambda _: [_print_checked(one) for one in done], as_json=as_json, passed=accepted)
+    accepted = all(checked.accepted for checked in done)
+    document = {"files": [_document(checked) for checked in done], "accepted": accepted}
+    conclude(document, lambda _: [_print_checked(checked) for checked in done], as_json=as_json, passed=accepted)
 
 
 def _document(file: CheckedFile) -> dict[str, Any]:
@@ -176,7 +176,7 @@ def _print_checked(file: CheckedFile) -> None:
 
 
 def _needed(file: CheckedFile) -> str:
-    """What would prove the origin: an archive proves the values of an XML, and nothing of the pages of a PDF."""
+    """How the origin can be proven: an archive proves the values of an XML, and nothing of the pages of a PDF."""
     signed = any(check.check == "signature" and check.state == "good" for check in file.checks)
     if file.path.suffix.lower() == ".pdf" and not signed:
         return "the pages of an unsigned PDF cannot be proven: give its XML with --archive, or ask for a signed PDF"

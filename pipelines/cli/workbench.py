@@ -73,14 +73,14 @@ def command(
             f"workbench: --tls {shown(tls)}: the certificate is missing, it is needed; name it before its key"
         )
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
-    for one in station or ():
-        load_station(one)  # a broken file is refused now, not when the page is opened
+    for path in station or ():
+        load_station(path)  # a broken file is refused now, not when the page is opened
     # a proxy connects for everybody from one address, and limits addresses itself
-    own = {"of_one_address": MOST} if behind_proxy else {}
-    limits = ConnectionLimits(plain=certificate is None, **own)
+    per_address = {"of_one_address": MOST} if behind_proxy else {}
+    limits = ConnectionLimits(plain=certificate is None, **per_address)
     address, *names = (part.strip() for part in host.split(","))
-    with listening_socket(address or HOST, port, "workbench", limits) as place:
-        listening = place.getsockname()[1]
+    with listening_socket(address or HOST, port, "workbench", limits) as listener:
+        listening = listener.getsockname()[1]
         settings = WorkbenchSettings(
             archive=Archive(archive or None).address, folder=folder, host=address or HOST, port=listening, names=tuple(names),
             tls=certificate is not None, proxied=behind_proxy, stations=tuple(station or ()), workers=workers,
@@ -91,5 +91,5 @@ def command(
         say(f"{settings.address}/?token={settings.token}")
         sys.stdout.flush()  # a program that started it waits for the address
         remark("Open the address above; Ctrl-C ends the workbench.")
-        servers.append(page_server(app, place, certificate, key))
-        run_until_stopped(servers[0], place, "workbench")
+        servers.append(page_server(app, listener, certificate, key))
+        run_until_stopped(servers[0], listener, "workbench")

@@ -44,15 +44,15 @@ def timeline(recording: FrameFile) -> Chart:
     places = list(dict.fromkeys(recording.place_of(exchange) for exchange in exchanges))
     at, spent = [], []
     for kind, role, symbol, beside in KINDS:
-        own = [exchange for exchange in exchanges if kind_of(exchange) == kind]
-        if not own:
+        of_kind = [exchange for exchange in exchanges if kind_of(exchange) == kind]
+        if not of_kind:
             continue
-        time = np.array([exchange.at_s for exchange in own])
-        row = np.array([places.index(recording.place_of(exchange)) + beside for exchange in own])
-        texts = tuple(_told(recording, exchange) for exchange in own)
+        time = np.array([exchange.at_s for exchange in of_kind])
+        row = np.array([places.index(recording.place_of(exchange)) + beside for exchange in of_kind])
+        texts = tuple(_told(recording, exchange) for exchange in of_kind)
         at.append(Trace(kind, time, row, role=role, symbol=symbol, size=7.0, texts=texts))
         if kind != "no answer":
-            seconds = np.array([max(exchange.seconds, 1e-6) for exchange in own]) * 1e3
+            seconds = np.array([max(exchange.seconds, 1e-6) for exchange in of_kind]) * 1e3
             spent.append(Trace(kind, time, seconds, role=role, symbol=symbol, size=5.0, texts=texts, legend=False))
     last = max((exchange.at_s + exchange.seconds for exchange in exchanges), default=1.0)
     span = PlotAxis("time since the start of the recording / s", low=0.0, high=last or 1.0)
@@ -88,15 +88,15 @@ MOST_ROWS = 2_000
 
 def devices_of(recording: FrameFile) -> list[RecordedDeviceRow]:
     """The devices of a recording with the number of their exchanges."""
-    of = [(recording.device_of(exchange), exchange.reply is None) for exchange in recording.exchanges]
+    answers = [(recording.device_of(exchange), exchange.reply is None) for exchange in recording.exchanges]
     return [
         {
             "place": device.place,
             "link": device.link,
             "device_id": device.device_id,
             "profile": "" if device.profile is None else device.profile.name,
-            "exchanges": sum(own == device for own, _ in of),
-            "no_answer": sum(own == device and silent for own, silent in of),
+            "exchanges": sum(asked == device for asked, _ in answers),
+            "no_answer": sum(asked == device and silent for asked, silent in answers),
         }
         for device in recording.devices
     ]

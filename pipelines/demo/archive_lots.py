@@ -31,7 +31,7 @@ _TAU_S = (100.0, 800.0, 6400.0)
 
 @dataclass(frozen=True)
 class Hidden:
-    """What makes lots of one wafer differ: the spring of their devices.
+    """The hidden physics: the spring of the devices of one wafer.
 
     hardening : k₃ of a restoring force x + k₃x³, 1/g²: the output falls behind a force f by about k₃f³
     """
@@ -78,13 +78,13 @@ class Line:
             self._unit(serial, str(wafer), force, time, chamber + 0.05 * rng.standard_normal())
             for serial, wafer in zip(serials, about["wafer"], strict=True)
         ]
-        told = _force(angles)
+        stated = _force(angles)
         common = {
             "dwell": np.arange(len(soak)),
             "time_s": time,
             "outer_deg": angles[:, 0],
             "inner_deg": angles[:, 1],
-            **{f"force_{a}": told[:, k] for k, a in enumerate("xyz")},
+            **{f"force_{a}": stated[:, k] for k, a in enumerate("xyz")},
             "chamber_C": chamber,
         }
         tables = [
@@ -102,7 +102,7 @@ class Line:
         return np.cumsum(step)
 
     def _unit(self, serial: str, wafer: str, force: Array, time: Array, temperature: Array) -> dict[str, Array | str]:
-        """What a device puts out, g: spring, misalignment, bias and scale that follow its temperature, noise."""
+        """Output of a device, g, of spring, misalignment, bias and scale that follow its temperature, noise."""
         rng = self._rng
         turned = np.eye(3) + 2e-3 * rng.standard_normal((3, 3))
         along = force @ turned.T
@@ -137,8 +137,8 @@ def _wander(rng: np.random.Generator, time: Array) -> Array:
     for tau in _TAU_S:
         state = rng.standard_normal(3)
         for k in range(time.size):
-            kept = math.exp(-(time[k] - time[k - 1]) / tau) if k else 1.0
-            state = kept * state + math.sqrt(1.0 - kept**2) * rng.standard_normal(3)
+            correlation = math.exp(-(time[k] - time[k - 1]) / tau) if k else 1.0
+            state = correlation * state + math.sqrt(1.0 - correlation**2) * rng.standard_normal(3)
             total[k] += state
     return total / math.sqrt(len(_TAU_S))
 
@@ -151,7 +151,7 @@ BEGIN = datetime(2026, 1, 5, 6, tzinfo=UTC)
 
 @dataclass(frozen=True)
 class DemoArchive:
-    """What was written: the archive, and the table of what is known of its units."""
+    """The files written: the archive, and the table of the attributes of its units."""
 
     folder: Path
     units: Path

@@ -55,7 +55,7 @@ def measure(chosen: Scene, seed: int, progress: Progress = silent) -> DemoLot:
 
 
 @dataclass
-class _Kept:
+class _InMemory:
     """The results of a capture in memory, because a demonstration is never resumed."""
 
     samples: list[pd.DataFrame] = field(default_factory=list)
@@ -93,13 +93,13 @@ def _once(recipe: Recipe, chosen: Scene, seed: int, repeat: int, progress: Progr
     """Dwells and temperatures of one run."""
     units = [Unit(serial=f"DEMO-{k + 1}", slot=k) for k in range(UNITS)]
     lot = Lot(units=units, device=recipe.device, sensor_axes=recipe.sensor_axes, seed=seed, repeat=repeat)
-    kept = _Kept()
+    records = _InMemory()
     with open_station(_station(chosen, seed), lot) as station:
-        capture(station, recipe, lot, kept, progress=progress)
+        capture(station, recipe, lot, records, progress=progress)
     accepted = pd.DataFrame({"unit": [u.serial for u in units], "refused": False})
-    readings = pd.concat(kept.readings, ignore_index=True)
-    dwells = reduce(summarised(kept.samples, readings), readings, accepted, recipe.local_gravity_m_s2)
-    return [dwells, pd.concat([h for h in kept.history if len(h)], ignore_index=True)]
+    readings = pd.concat(records.readings, ignore_index=True)
+    dwells = reduce(summarised(records.samples, readings), readings, accepted, recipe.local_gravity_m_s2)
+    return [dwells, pd.concat([h for h in records.history if len(h)], ignore_index=True)]
 
 
 def _recipe(chosen: Scene) -> Recipe:

@@ -39,7 +39,7 @@ def compare(
     fresh_history: pd.DataFrame | None = None,
     before: Sequence[str] | None = None,
 ) -> ComparisonDocument:
-    """How well a model fits a lot, and a fresh run of the same units with the coefficients unchanged.
+    """Errors of a model in a lot, and in a fresh run of these units with the coefficients unchanged.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def compare(
     """
     try:
         with threadpool_limits(1):
-            again = None if fresh is None else measured(fresh, fresh_history)
-            return _compared(measured(dwells, history), effects, again, before)
+            remeasured = None if fresh is None else measured(fresh, fresh_history)
+            return _compared(measured(dwells, history), effects, remeasured, before)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
@@ -130,8 +130,8 @@ def _remember(measurement: Measured, terms: Sequence[Term]) -> list[str]:
     """The effects that depend on the temperature between the dwells; none if its history is given."""
     if measurement.state.temperature is None or measurement.state.history is not None:
         return []
-    own = [t.effect for t in terms if not isinstance(t.effect, Handling)]
-    return [e.id for e in own if e.memory and "temperature" in drivers_of(measurement.state, e)]
+    effects = [t.effect for t in terms if not isinstance(t.effect, Handling)]
+    return [e.id for e in effects if e.memory and "temperature" in drivers_of(measurement.state, e)]
 
 
 def _station(fitted: Estimate) -> list[StationParameter]:
@@ -145,15 +145,15 @@ def _station(fitted: Estimate) -> list[StationParameter]:
     ]
 
 
-def _same_units(first: Measured, again: Measured) -> Measured:
+def _same_units(first: Measured, fresh: Measured) -> Measured:
     """The fresh run with its units in the order of the first."""
-    strange = sorted(set(again.units) ^ set(first.units))
+    strange = sorted(set(fresh.units) ^ set(first.units))
     if strange:
         raise DataRejected(
             f"compare: {', '.join(strange[:5])} not in both runs, every unit is needed in both; "
             "give a fresh run of the same units, or leave the others out of both files"
         )
-    return again.pick([again.units.index(u) for u in first.units])
+    return fresh.pick([fresh.units.index(u) for u in first.units])
 
 
 def _by_pose(measurement: Measured, left: Array) -> list[PoseComparison]:
@@ -161,10 +161,10 @@ def _by_pose(measurement: Measured, left: Array) -> list[PoseComparison]:
     if measurement.reference == "norm":
         return []
     force = np.round(measurement.state.force[0], 2) + 0.0
-    poses, place = np.unique(force, axis=0, return_inverse=True)
-    place = place.reshape(-1)
+    poses, pose_of = np.unique(force, axis=0, return_inverse=True)
+    pose_of = pose_of.reshape(-1)
     rows: list[PoseComparison] = [
-        {"force": poses[k].tolist(), "dwells": int(np.sum(place == k)), "rms_ug": MICRO * rms(left[:, place == k])}
+        {"force": poses[k].tolist(), "dwells": int(np.sum(pose_of == k)), "rms_ug": MICRO * rms(left[:, pose_of == k])}
         for k in range(len(poses))
     ]
     return sorted(rows, key=lambda row: -row["rms_ug"])
@@ -192,7 +192,7 @@ def doubt_of_run(measurement: Measured, lot: Lot, before: Sequence[str], after: 
 
 def _with_effects(lot: Lot, after: Sequence[str]) -> str | None:
     verdict = judged(lot, after, generator())
-    named = [name for one in verdict.handled for name in one.effects.ids] + _bad(verdict.removed)
+    named = [name for finding in verdict.handled for name in finding.effects.ids] + _bad(verdict.removed)
     if named:
         return f"with it the diagnosis of the run names {_listed(named)}"
     if verdict.adequate is True:
@@ -203,7 +203,7 @@ def _with_effects(lot: Lot, after: Sequence[str]) -> str | None:
 def _without_effects(lot: Lot, before: Sequence[str]) -> str | None:
     first = diagnose(lot, before, generator())
     # a handling error in the class of an effect explains the run as well as the effect
-    groups = [one.effects for one in (*first.handled, *first.named) if one.effects.of_data]
+    groups = [finding.effects for finding in (*first.handled, *first.named) if finding.effects.of_data]
     named = [name for group in groups for name in group.ids] + _bad(first.removed)
     return f"without it the diagnosis of the run names {_listed(named)}" if named else None
 

@@ -50,7 +50,7 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> Confirma
     rises, reason = None, None
     if change.confirmed is True:
         # with the coefficients unchanged, less the bias of the day
-        left = [without_own_bias(problem, one.terms, residuals_of(problem, one)) for one in (old, new)]
+        left = [without_own_bias(problem, fitted.terms, residuals_of(problem, fitted)) for fitted in (old, new)]
         rises = _clear_rise("the error on the fresh run", left[0], left[1]) or _rises_left_out(
             left_out(before, also=after.terms), out
         )
@@ -79,14 +79,14 @@ def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None
     gain = gains.get("blocks of time")
     falls: dict[Kind, tuple[float, float]] = {kind: _fall(before.missed[kind], after.missed[kind]) for kind in kinds}
     worst = min(kinds, key=lambda kind: falls[kind][0]) if kinds else None
-    both = (before.rms(set(kinds)), after.rms(set(kinds))) if kinds else (float("nan"), float("nan"))
+    errors = (before.rms(set(kinds)), after.rms(set(kinds))) if kinds else (float("nan"), float("nan"))
     rises = None
     if gain is None:
         against = "no judgement is possible"
     elif not gain > LEFT_OUT:  # a nan is no gain
         against = f"their log likelihood changes by {gain:+.1f}, more than {LEFT_OUT:g} is needed"
     else:
-        rises = _rise("the error on dwells left out", *both)
+        rises = _rise("the error on dwells left out", *errors)
         # the search for a fault of the run is the longest part: only where it decides
         against = rises or _disagreement(gains, falls) or doubt()
     return {
@@ -238,14 +238,14 @@ def text_of(row: VersionDocument, progress: Confirmation | None) -> str:
             f"confirmed on stretches of time left out (log likelihood +{gain:.1f}), and the run shows no fault; {fall}"
         )
     why = progress["reason"] or "no judgement is possible"
-    told = why if fall in why else f"{why}; {fall}"
+    text = why if fall in why else f"{why}; {fall}"
     decides = "a fresh run of the same units decides"
     if gain is not None and gain > LEFT_OUT:
         return (
             f"not decided by this run alone: stretches of time left out confirm it (log likelihood "
-            f"+{gain:.1f}), but {told}; {decides}"
+            f"+{gain:.1f}), but {text}; {decides}"
         )
-    return f"not decided by dwells left out: {told}; {decides}"
+    return f"not decided by dwells left out: {text}; {decides}"
 
 
 def _told_by_fresh(progress: Confirmation, fall: str) -> str:
@@ -268,5 +268,5 @@ def _fall_text(progress: Confirmation) -> str:
     if fall is None:
         return "the error cannot be judged on dwells left out"
     beside = {"base": "the coefficients of the earlier model", "bias": "the bias of each unit"}
-    again = beside.get(progress["estimated_again"] or "")
-    return fall_of(fall, progress["fall_u_ug"]) + (f" with {again} fitted to the fresh run anew" if again else "")
+    refitted = beside.get(progress["estimated_again"] or "")
+    return fall_of(fall, progress["fall_u_ug"]) + (f" with {refitted} fitted to the fresh run anew" if refitted else "")

@@ -240,7 +240,7 @@ def examination(
 
     Parameters
     ----------
-    judged : the model; the default one if None
+    judged : effects of the model; the default model if None
     left_out : ``UNIT:DWELL``, which were removed from ``table`` on purpose
     """
     effects = list(judged) if judged else default_model(table)

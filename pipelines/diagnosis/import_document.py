@@ -95,7 +95,7 @@ def _table_of_dwells(
             f"{', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
         )
     beside = file_beside(str(path), "history")
-    dwells, told = complete_table(
+    dwells, remarks = complete_table(
         checked(table, where=path.name, foreign=True), keys.get("units", {}).get("output", "")
     )
     run = keep_table_of_dwells(dwells, read_history(beside) if beside else None, path.name, archive, source)
@@ -106,7 +106,7 @@ def _table_of_dwells(
         "out_unit": str(dwells["out_unit"].iloc[0]) if "out_unit" in dwells.columns else "",
         "samples": 0,
         "dwells": len(dwells),
-        "remarks": [*told, *([f"temperatures between the dwells: {Path(beside).name}"] if beside else [])],
+        "remarks": [*remarks, *([f"temperatures between the dwells: {Path(beside).name}"] if beside else [])],
         "faults": [],
         "fit": None,
         "adequate": None,
@@ -116,7 +116,7 @@ def _table_of_dwells(
 
 
 def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
-    """The mapping, with the unit that the file states where none was given; one without columns or unit is refused."""
+    """The mapping, with the unit that the file states where none was given; a mapping without columns or unit is refused."""
     from pipelines.importers import mapping as mapped
     from pipelines.importers import stated_units
 

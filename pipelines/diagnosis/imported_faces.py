@@ -24,12 +24,12 @@ COVERAGE = 2.0
 """Factor k of the printed uncertainties: the standard errors of a fit hold Student's factor for it already."""
 GROSS = 0.05
 """Smallest part of gravity along a face placed by hand: cos 18° is 0.95."""
-_OWN = 0.9
-"""Share of its own axis in the response of an output: 25° of a hand."""
+_ON_AXIS = 0.9
+"""Least cosine of the angle between an output and its axis: 25° where a hand turns the device."""
 _ODD = 0.5
-"""Distance of the sums of two pairs of faces, over those of the third from both, below which the third is the odd one."""
+"""Distance between the sums of two pairs of faces, over their distances from the third sum, below which the third pair leans."""
 _NOISELESS = 1e-6
-"""Noise over gravity that is put in for means without a recorded one: far below any scatter, which alone counts then."""
+"""Noise over gravity that stands for noise that was not recorded: far below any scatter, which alone counts then."""
 
 
 def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
@@ -73,7 +73,7 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
         },
     }
     lines = [_line(k, (bias[k], bias_u[k], float(published.bias[k])), plain, data.out_unit) for k in range(3)]
-    lines += [f"data fault {one['fault']}: {one['evidence']}" for one in verdict["blocked_by"]]
+    lines += [f"data fault {fault['fault']}: {fault['evidence']}" for fault in verdict["blocked_by"]]
     lines += [why] if why else []
     if verdict["adequate"] is False and share <= GROSS and (askew := _askew(up, down, plain.response * gravity)):
         lines.append(askew)
@@ -83,7 +83,7 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
 
 
 def _with_noise(dwells: pd.DataFrame, plain: Faces) -> pd.DataFrame:
-    """The dwells with their noise; where it is not recorded, with one so small that the scatter about the fit decides."""
+    """The dwells with their noise; where none is recorded it is so small that the scatter about the fit decides."""
     if {*SPREAD_COLUMNS, "n"} <= set(dwells.columns):
         return dwells
     made = dwells.assign(n=1)
@@ -111,19 +111,19 @@ def _exchanged(up: Array, down: Array, gravity: float) -> str:
     means = np.concatenate([up, down])
     names = [f"{sign}{axis}" for sign in "+-" for axis in AXES]
     agreeing: list[str] = []
-    for one, other in combinations(range(len(names)), 2):
+    for first, second in combinations(range(len(names)), 2):
         order = np.arange(len(names))
-        order[[one, other]] = order[[other, one]]
+        order[[first, second]] = order[[second, first]]
         fit = faces(means[order[:3]], means[order[3:]], gravity)
         size = np.linalg.norm(fit.response, axis=1)
-        own = np.diagonal(fit.response) / size
-        if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(own)) > _OWN:
-            agreeing.append(f"{names[one]} and {names[other]}")
+        cosines = np.diagonal(fit.response) / size
+        if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(cosines)) > _ON_AXIS:
+            agreeing.append(f"{names[first]} and {names[second]}")
     return f"; with {agreeing[0]} exchanged they agree" if len(agreeing) == 1 else ""
 
 
 def _askew(up: Array, down: Array, response: Array) -> str:
-    """The pair of faces of which one leans; empty where the three pairs disagree alike.
+    """A message that names the pair of faces of which one leans; empty where the three pairs disagree alike.
 
     The outputs of a pair add up to twice the bias; a face that leans by an angle adds the force of that angle, across it.
 
@@ -164,8 +164,8 @@ def _by_face(dwells: pd.DataFrame, mapping: Mapping) -> tuple[Array, Array, Arra
 def _line(k: int, bias: tuple[float, float, float], plain: Faces, unit: str) -> str:
     """An output as text; ``bias``: its value, its standard error, and the bias of the published method."""
     value, error, published = bias
-    told = f"{AXES[k]}: bias {value:.7g} ± {COVERAGE * error:.2g} {unit} (k = {COVERAGE:g}; published method {published:.7g})"
+    text = f"{AXES[k]}: bias {value:.7g} ± {COVERAGE * error:.2g} {unit} (k = {COVERAGE:g}; published method {published:.7g})"
     misfit = f"lack of fit {plain.rms[k]:.3g}"
     if not np.isfinite(plain.p_value[k]):
-        return f"{told}; {misfit} {unit}"
-    return f"{told}; {misfit}, the samples allow {plain.pure_error[k]:.2g} {unit} (p {equal(plain.p_value[k])})"
+        return f"{text}; {misfit} {unit}"
+    return f"{text}; {misfit}, the samples allow {plain.pure_error[k]:.2g} {unit} (p {equal(plain.p_value[k])})"

@@ -75,8 +75,8 @@ def fitted(
         smaller = _smaller(dwells, history, effects, gravity)
     verdict = diagnose(fitted_dwells(dwells), history, list(effects))
     lines = tuple(_lines(done, smaller, verdict, out_unit))
-    told = told_by(verdict, dwells["unit"].nunique())
-    return NormAnswer(done, _document(done, smaller, verdict), lines, told)
+    adequacy = told_by(verdict, dwells["unit"].nunique())
+    return NormAnswer(done, _document(done, smaller, verdict), lines, adequacy)
 
 
 def _smaller(
@@ -94,8 +94,8 @@ def _smaller(
 
 def _bias(done: FittedNorms) -> Array:
     """Bias of every unit, (units, 3), output unit."""
-    place = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
-    return np.stack([done.fit.fit.coefficients[:, axis, k] for axis, k in enumerate(place)], axis=1)
+    columns = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
+    return np.stack([done.fit.fit.coefficients[:, axis, k] for axis, k in enumerate(columns)], axis=1)
 
 
 def _holds_at(done: FittedNorms) -> float | None:
@@ -216,15 +216,15 @@ def _bad_line(out: LeaveOut, verdict: DiagnosisDocument) -> str:
     return f"bad dwells: {names}; without them {left}; to leave them out: tumbleline fit RUN --leave-out {names}"
 
 
-def _axis_line(done: FittedNorms, spread: dict[str, Array], place: tuple[int, int], unit: str) -> str:
-    u, k = place
+def _axis_line(done: FittedNorms, spread: dict[str, Array], index: tuple[int, int], unit: str) -> str:
+    u, k = index
     level = float(done.scale[u, k]) / MICRO
     record, long = (COVERAGE * float(spread[name][u, k]) * level for name in ("bias_record_u_ug", "bias_long_u_ug"))
     whose = f"{done.measured.units[u]} " if len(done.measured.units) > 1 else ""
     later = f"± {long:.2g} over the next day" if np.isfinite(long) else "over the next day not known"
-    own = done.fit.fit
-    errors = COVERAGE * np.sqrt(np.diagonal(own.covariance[u, k]))
-    value = {name: (own.coefficients[u, k, j], errors[j]) for j, (_, name) in enumerate(own.names[k])}
+    fit = done.fit.fit
+    errors = COVERAGE * np.sqrt(np.diagonal(fit.covariance[u, k]))
+    value = {name: (fit.coefficients[u, k, j], errors[j]) for j, (_, name) in enumerate(fit.names[k])}
     scale = _stated(np.array([done.scale[u, k], value.get("K1", (0.0, 0.0))[1]]) / STANDARD_GRAVITY_M_S2)
     across = [
         f"{other} {_stated(1e3 * np.array(value[name]) / done.scale[u, k])}"
@@ -256,7 +256,7 @@ _NORM_NEEDS = 9
 
 
 def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
-    """The fit called ``method``, one of :data:`METHODS`, of one unit's import, with a verdict on its own adequacy."""
+    """The fit ``method`` of :data:`METHODS` to the import of a unit, with the verdict on its adequacy."""
     if data.dwells is not None:
         imported_dwells(data)  # refuses what no fit at import can use
     silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""

@@ -22,7 +22,7 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
 
     Parameters
     ----------
-    history : a file; empty for the run's own, or for the one beside a file of dwells
+    history : a file; empty for the history of the run, or for the file beside a file of dwells
     """
     dwells = read_dwells(source, archive=archive)
     beside = history or (file_beside(source, "history") if is_file(source) else "")
@@ -45,7 +45,7 @@ def file_beside(source: str, what: Literal["history", "fresh"]) -> str:
 
 
 def judged_effects(source: str, archive: str | None, listed: str, model: Path | None, where: str) -> list[str] | None:
-    """The model that is judged: the one given, else that of the run; None if there is neither.
+    """Effects of the model that is judged: the given model, else that of the run; None if there is neither.
 
     Parameters
     ----------

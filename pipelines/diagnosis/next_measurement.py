@@ -27,10 +27,10 @@ BREAKER_POSE = (0.0, 0.0, 25.0)
 
 @dataclass(frozen=True)
 class Proposed:
-    """What to measure next, in order: steps that separate classes of several effects, then steps that show unseen effects.
+    """The next measurements, in order: steps that separate classes of several effects, then steps that show unseen effects.
 
     parting : classes, each with None if no steps of the station are certain to separate it
-    twins : per class, the members that no measurement of the station separates from its best one, and that one
+    twins : per class, the members that no measurement of the station separates from its best member, and that member
     showing : None if no unseen effect matters, or the station cannot show any
     """
 
@@ -47,11 +47,11 @@ class Proposed:
         """All proposals as rows, in order of measurement."""
         rows: list[NextMeasurement] = []
         twins = [*self.twins, *[()] * (len(self.parting) - len(self.twins))]
-        for (group, measurement), alike in zip(self.parting, twins, strict=True):
-            rows += rows_of(measurement) if measurement is not None else [] if alike else [_breaker(group)]
-            if alike:  # what separates effects that are identical under every step of the station
-                needed = "; ".join(dict.fromkeys(catalogue.get(name).breaker for name in alike))
-                why = f"{' | '.join(alike)}: no measurement of this station separates them; needed: {needed}"
+        for (group, measurement), twin_ids in zip(self.parting, twins, strict=True):
+            rows += rows_of(measurement) if measurement is not None else [] if twin_ids else [_breaker(group)]
+            if twin_ids:  # what separates effects that are identical under every step of the station
+                needed = "; ".join(dict.fromkeys(catalogue.get(name).breaker for name in twin_ids))
+                why = f"{' | '.join(twin_ids)}: no measurement of this station separates them; needed: {needed}"
                 rows.append(_without_steps(why))
         return rows if self.showing is None else [*rows, *rows_of(self.showing)]
 
@@ -69,20 +69,20 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
     for named in (*diagnosis.handled, *diagnosis.named):
         if len(named.effects.members) > 1:
             # more poses do not separate handling errors from effects; the text of the handling error says what does
-            measurement, alike = None, ()
+            measurement, twin_ids = None, ()
             if not named.effects.of_data:
                 with suppress(MissingInput):  # a quantity that the run did not record
                     measurement = proposal(diagnosis.final, named.effects, around, already)
                 with suppress(MissingInput):
-                    alike = twins(diagnosis.final, named.effects, around)
+                    twin_ids = twins(diagnosis.final, named.effects, around)
             already += measurement.steps if measurement is not None else ()
             parting.append((named.effects, measurement))
-            twin.append(alike)
+            twin.append(twin_ids)
     return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already), tuple(twin))
 
 
 def _breaker(group: EffectClass) -> NextMeasurement:
-    """What separates a class, as text, if no steps of the station do."""
+    """A row without steps that states what separates a class which no steps of the station separate."""
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
     steps = "" if group.of_data else "no steps of the station are certain to separate them; needed:  "
@@ -198,7 +198,7 @@ def _explicit(base: Recipe, soak: int) -> dict[str, Any]:
 
 
 def _soak_for(soaks: list[dict[str, Any]], row: NextMeasurement) -> dict[str, Any]:
-    """The soak that a step is measured in: the last one at its temperature, else a new one."""
+    """The soak that a step is measured in: the last soak at its temperature, else a new soak."""
     temperature = float(row["chamber_C"])
     if abs(soaks[-1]["temperature_C"] - temperature) >= SAME_SOAK_K:
         soaks.append(
@@ -215,10 +215,10 @@ def _soak_for(soaks: list[dict[str, Any]], row: NextMeasurement) -> dict[str, An
 
 
 def _tidied(part: dict[str, Any], base: Recipe) -> dict[str, Any]:
-    """A soak without waits and times without power of its own."""
-    kept = dict(part)
+    """A soak without ``waits_s`` and ``off_s`` that only repeat what the recipe ``base`` has anyway."""
+    tidied = dict(part)
     if all(wait == base.settle_s for wait in part["waits_s"]):
-        kept["waits_s"] = None
+        tidied["waits_s"] = None
     if not any(part["off_s"]):
-        kept["off_s"] = None
-    return kept
+        tidied["off_s"] = None
+    return tidied

@@ -37,7 +37,7 @@ BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""
 
 _ALIKE = 0.5
-"""Share of the residuals' variance from which it is said that they are alike in all units: more than is the units' own."""
+"""Share of the variance of the residuals that is common to all units, from which on a notice says so."""
 
 _ACROSS, _ALONG = 0.3, 0.9
 """Forces along the axis, g, below and above which its noise is compared."""
@@ -90,7 +90,7 @@ def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, tuple[dict[str, Any], 
     return {
         term.effect.id: (dict(term.values), dict(between.get(term.effect.id, {})))
         for term in model.terms
-        if term.values and term.effect.id in {one.effect.id for one in added}
+        if term.values and term.effect.id in {proposed.effect.id for proposed in added}
     }
 
 
@@ -276,12 +276,12 @@ def noise_along(run: ExaminedRun) -> list[str]:
 
 
 def noise_of_the_lot(model: Model, units: int) -> list[str]:
-    """A notice where much of the residual of a model is the same in all units."""
-    alike = correlation_of_units(model)
-    if alike < _ALIKE:
+    """A notice where the variance of the residuals is, for the greater part, common to all units."""
+    common = correlation_of_units(model)
+    if common < _ALIKE:
         return []
-    shared, own = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (alike, 1.0 - alike))
-    text = f"of what remains {shared} µg are alike in all {units} units, {own} µg are each unit's own"
+    shared, single = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (common, 1.0 - common))
+    text = f"of what remains {shared} µg are alike in all {units} units, {single} µg are each unit's own"
     return [f"{text}: look for the cause in what they share, such as table, fixture, reference or supply"]
 
 

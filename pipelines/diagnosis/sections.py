@@ -152,11 +152,11 @@ def unseen(document: DiagnosisDocument, *, brief: bool = False) -> Section:
     reasons = document.get("reasons", {})
     rows = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
     counts = Counter(column for _, text in rows if brief and (column := sentences.not_recorded(text)))
-    kept = [row for row in rows if not (brief and sentences.not_recorded(row[1]))]
+    shown = [row for row in rows if not (brief and sentences.not_recorded(row[1]))]
     listed = ", ".join(f"{_quantity(column)} ({number_of(count, 'effect')})" for column, count in counts.most_common())
     notes = [f"not recorded: {listed}; --all lists them"] if listed else []
     return Section(
-        "Effects that this plan cannot show", ("effect", "reason, and measurement that shows it"), kept, notes
+        "Effects that this plan cannot show", ("effect", "reason, and measurement that shows it"), shown, notes
     )
 
 

@@ -31,9 +31,9 @@ def verdict(document: DiagnosisDocument) -> str:
         )
     judged = {"adequate": document["adequate"], "reason": document.get("reason"), **error}
     judged["units"] = len(document["units"]) - len(faulty)
-    told, figures = plain_verdict(judged), _figures(judged)
+    text, figures = plain_verdict(judged), _figures(judged)
     if document["adequate"] is not False:
-        return f"{told}."
+        return f"{text}."
     spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
     single = document["leave_out"]
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
@@ -45,17 +45,12 @@ def verdict(document: DiagnosisDocument) -> str:
         without = f"the model {'cannot be judged' if passes and unknown else found}: {figures}"
         return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
     if named:
-        return f"{told}; missing: {', and '.join(named)}."
-    rest = (
-        document.get("reason")
-        or suspected_text(document)
-        or (
-            "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
-        )
-    )
+        return f"{text}; missing: {', and '.join(named)}."
+    nothing = "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
+    rest = document["reason"] or suspected_text(document) or nothing
     if document["unexplained"]:
         rest = f"{document['unexplained']['text']}, and no effect of the catalogue explains it"
-    return f"{told}; {rest}."
+    return f"{text}; {rest}."
 
 
 def plain_verdict(judged: Mapping[str, Any]) -> str:
@@ -193,7 +188,7 @@ def tails_left_out(document: DiagnosisDocument) -> str:
 
 
 def left_out(document: DiagnosisDocument) -> list[str]:
-    """What was left out of the judgement, and what the verdict is without it."""
+    """Sentences on dwells that were left out of the judgement, and on the verdict without them."""
     removed = document.get("removed")
     count = len(removed["dwells"]) if removed and not removed["heavy_tails"] else 0
     were = "s were" if count > 1 else " was"
@@ -226,15 +221,15 @@ def why_recommended(document: DiagnosisDocument) -> list[str]:
 
 
 def not_listed(document: DiagnosisDocument) -> str:
-    """How many effects this plan cannot show, or only in part; empty where it shows all."""
+    """A sentence with the number of effects that this plan cannot show, or only in part; empty where it shows all."""
     part = len({row["effect"] for row in document.get("unseen_in_part", ())})
     counts = (("cannot show {}", len(document["unseen"])), ("shows {} only in part", part))
-    told = [what.format(number_of(count, "effect")) for what, count in counts if count]
-    return f"This plan {' and '.join(told)}" if told else ""
+    counted = [what.format(number_of(count, "effect")) for what, count in counts if count]
+    return f"This plan {' and '.join(counted)}" if counted else ""
 
 
 def unexplained_text(document: DiagnosisDocument) -> str:
-    """What the residual follows without an effect of the catalogue that explains it; empty where there is nothing."""
+    """The quantity that the residual follows without an effect of the catalogue that explains it; empty where there is none."""
     unexplained = document["unexplained"]
     if not unexplained:
         return ""
@@ -262,7 +257,7 @@ def not_recorded(reason: str) -> str:
 
 
 def _without_angles(document: DiagnosisDocument) -> str:
-    """What could not be tried because the angles of the table are not recorded, as a sentence to add; empty where they are."""
+    """A sentence on effects that could not be tried without the angles of the table; empty where they are recorded."""
     reasons = document.get("reasons", {})
     names = [name for name in document["unseen"] if not_recorded(reasons.get(name, "")) == "outer_deg"]
     if not names:
@@ -285,20 +280,20 @@ def why_first(document: DiagnosisDocument) -> list[str]:
 
 
 def cost_to_decide(document: DiagnosisDocument) -> list[str]:
-    """What the next measurement costs and brings, one line for each purpose; or what would separate a class in place of it."""
+    """Cost and gain of the next measurement, a line for each purpose; where none is possible, what would separate the class."""
     lines: list[str] = []
     rows = document["next_measurements"]
     for why in dict.fromkeys(row["why"] for row in rows):
-        own = [row for row in rows if row["why"] == why]
-        if not own[0].get("measurable", True) or "minutes" not in own[0]:
+        proposal = [row for row in rows if row["why"] == why]
+        if not proposal[0].get("measurable", True) or "minutes" not in proposal[0]:
             lines.append(f"To decide: {why}")
             continue
-        steps = number_of(sum(int(row.get("repeats", 1)) for row in own), "step")
+        steps = number_of(sum(int(row.get("repeats", 1)) for row in proposal), "step")
         if why.startswith(UNSEEN):
-            names, minutes = why.removeprefix(UNSEEN), short(own[0]["minutes"])
+            names, minutes = why.removeprefix(UNSEEN), short(proposal[0]["minutes"])
             lines.append(f"To see {names}, too: {steps}, {minutes} min of station time")
         else:
-            lines.append(f"To decide: {steps} for {brings(own[0])}")
+            lines.append(f"To decide: {steps} for {brings(proposal[0])}")
     return lines
 
 

@@ -17,14 +17,14 @@ _PARTS = {
 
 
 def what_follows(unexplained: Unexplained) -> str:
-    """What of the output follows the driver, as text."""
+    """The part of the output that follows the driver, as text."""
     verb = "follow" if unexplained.part == "axes" else "follows"
     swing = "" if unexplained.period is None else f" with a period of {unexplained.period / 60.0:.3g} min"
     return f"{_PARTS[unexplained.part]} {verb} {unexplained.driver}{swing}"
 
 
 def offer(unexplained: Unexplained, state: State) -> SuggestedFormula | None:
-    """A formula that follows the driver: a line, a swing, or a cubic about the middle of its range; None if it is no single one.
+    """A formula that follows the driver: a line, a swing, or a cubic about the middle of its range; None where no quantity is it.
 
     Of the scale factor and the axes it is times the forces along and across the axis; of the transfer curve the quantity is times
     the square and the cube of the force.

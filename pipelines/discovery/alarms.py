@@ -32,15 +32,15 @@ class Alarms:
     def pool(self) -> Pool:
         """The columns and their products, means over the archive."""
         columns, k = self.state.columns, len(self.state.columns)
-        place = {column: at for at, column in enumerate(columns)}
+        index = {column: at for at, column in enumerate(columns)}
         lot, inside, size = np.zeros((AXES * k, AXES * k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
         weight = np.zeros(k)
         for product in self.source.store.products:
-            at = np.array([place[column] for column in product.columns if column in place])
+            at = np.array([index[column] for column in product.columns if column in index])
             if at.size != len(product.columns):
                 continue
-            here = (np.arange(AXES)[:, None] * k + at).reshape(-1)
-            lot[np.ix_(here, here)] += product.runs * product.lot
+            indices = (np.arange(AXES)[:, None] * k + at).reshape(-1)
+            lot[np.ix_(indices, indices)] += product.runs * product.lot
             inside[:, at[:, None], at] += product.runs * product.inside
             size[:, at] += product.runs * product.size.reshape(AXES, -1)
             weight[at] += product.runs
@@ -48,7 +48,7 @@ class Alarms:
 
     def effect_of(self, alarm: Alarm) -> str:
         """Id of the effect of an alarm."""
-        return hypothesis(self.state, alarm.place)[0]
+        return hypothesis(self.state, alarm.index)[0]
 
     def day_of(self, alarm: Alarm) -> str:
         """The day of the lot that raised an alarm."""
@@ -61,6 +61,6 @@ class Alarms:
 
     def log_e(self, alarm: Alarm) -> float:
         """Logarithm of the evidence of an alarm's hypothesis now."""
-        of_station = alarm.place >= self.state.sensor.size
+        of_station = alarm.index >= self.state.sensor.size
         evidence = self.state.station if of_station else self.state.sensor
-        return float(evidence.drivers[alarm.driver].log_e[alarm.place - (self.state.sensor.size if of_station else 0)])
+        return float(evidence.drivers[alarm.driver].log_e[alarm.index - (self.state.sensor.size if of_station else 0)])

@@ -46,21 +46,21 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
     known = before.serial if by == "serial" else before.run
     values = _values(table, key, names, source)
     new, counts = dict[str, dict[str, str]](), {"added": 0, "changed": 0, "unchanged": 0}
-    for one, own in values.items():
-        for name, value in own.items():
-            old = known.get(one, {}).get(name)
+    for subject, texts in values.items():
+        for name, value in texts.items():
+            old = known.get(subject, {}).get(name)
             kind = "added" if old is None else "unchanged" if old == value else "changed"
             counts[kind] += 1
             if kind != "unchanged":
-                new.setdefault(one, {})[name] = value
+                new.setdefault(subject, {})[name] = value
     file = _append(archive, {"by": by, "source": source, "values": new, **provenance()}) if new else ""
     infos = archive.runs()
-    there = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
+    present = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
     return {
         **counts,  # type: ignore[typeddict-item]  # the three counts
         "by": by,
         "names": names,
-        "unknown": [one for one in values if one not in there],
+        "unknown": [subject for subject in values if subject not in present],
         "refused": refused,
         "file": file,
     }
@@ -80,11 +80,11 @@ def as_numbers(values: Sequence[str]) -> dict[str, float] | None:
 
 
 def _append(archive: Archive, content: Mapping[str, Any]) -> str:
-    """Write the next file, and its name; of two processes one waits."""
+    """Write the next file of attributes and return its name; a second process waits."""
     with alone(archive.root / FOLDER, wait=True):
-        place = archive.root / FOLDER / f"{len(attribute_files(archive)) + 1:06d}.json"
-        files.publish(place, files.manifest_bytes(content))
-    return place.name
+        path = archive.root / FOLDER / f"{len(attribute_files(archive)) + 1:06d}.json"
+        files.publish(path, files.manifest_bytes(content))
+    return path.name
 
 
 def _key_column(table: pd.DataFrame, by: By, source: str) -> str:
@@ -103,21 +103,21 @@ def _values(table: pd.DataFrame, key: str, names: list[str], source: str) -> dic
     """The values by key, as text; empty cells say nothing."""
     out: dict[str, dict[str, str]] = {}
     for row in table.to_dict("records"):
-        one = _text(row[key])
-        if not one:
+        subject = _text(row[key])
+        if not subject:
             raise WrongUse(
                 f"attributes: {source} has a row without {key}, one is needed in each; fill it in or remove the row"
             )
-        own = out.setdefault(one, {})
+        texts = out.setdefault(subject, {})
         for name in names:
             value = _text(row[name])
-            if value and own.get(name, value) != value:
+            if value and texts.get(name, value) != value:
                 raise WrongUse(
-                    f"attributes: {source} has two values of {name} for {one} ({own[name]}, {value}), one is needed; "
+                    f"attributes: {source} has two values of {name} for {subject} ({texts[name]}, {value}), one is needed; "
                     "add the newer one in a file of its own"
                 )
             if value:
-                own[name] = value
+                texts[name] = value
     return out
 
 
@@ -131,7 +131,7 @@ def _text(value: object) -> str:
 
 
 def sentences(added: AddedAttributes) -> list[str]:
-    """What was added, for people."""
+    """Sentences on the attributes that were added."""
     what = ", ".join(added["names"])
     new = number_of(added["added"], "new value")
     lines = [f"{what}: {new}, {added['changed']} changed, {added['unchanged']} as before"]
@@ -147,7 +147,7 @@ _EXAMPLES = 4
 
 
 def added_from(archive: Archive, path: Path, by: str) -> tuple[AddedAttributes, list[str]]:
-    """What a file adds, and the same in sentences.
+    """Add the attributes of a file to an archive; the counts, and sentences that state them.
 
     Raises
     ------
@@ -175,13 +175,15 @@ def listed(archive: Archive) -> ListedAttributes:
     """Every attribute: of units or runs, for how many it is known, how many levels it has, some of them."""
     known = known_attributes(archive)
     rows: list[KnownAttribute] = []
-    for kind, of in (("units", known.serial), ("runs", known.run)):
-        names = dict.fromkeys(name for values in of.values() for name in values)
+    for kind, by_key in (("units", known.serial), ("runs", known.run)):
+        names = dict.fromkeys(name for values in by_key.values() for name in values)
         for name in names:
-            values = [own[name] for own in of.values() if name in own]
+            values = [texts[name] for texts in by_key.values() if name in texts]
             levels = sorted(set(values))
-            some = _some(levels, _EXAMPLES)
-            rows.append({"attribute": name, "of": kind, "known": len(values), "levels": len(levels), "such_as": some})
+            examples = _some(levels, _EXAMPLES)
+            rows.append(
+                {"attribute": name, "of": kind, "known": len(values), "levels": len(levels), "such_as": examples}
+            )
     return {"attributes": rows}
 
 

@@ -24,11 +24,11 @@ def populations(archive: Archive, device: str, workers: int = 1) -> list[Populat
     """Coefficients whose units are two populations, and pairs that correlate: each unit once, by its first calibration."""
     index = up_to_date(archive, workers=workers)
     runs = first_runs(dated_runs(index), np.inf)
-    every = load(index, runs)
-    own = every.chosen(every.device.astype(str) == device)
-    order = np.argsort(own.day, kind="stable")
-    first = own.chosen(order[np.unique(own.unit[order].astype(str), return_index=True)[1]])
-    judged = [name for name in NAMES if FAMILIES[FAMILY_OF[name]].own]
+    calibrations = load(index, runs)
+    of_kind = calibrations.chosen(calibrations.device.astype(str) == device)
+    order = np.argsort(of_kind.day, kind="stable")
+    first = of_kind.chosen(order[np.unique(of_kind.unit[order].astype(str), return_index=True)[1]])
+    judged = [name for name in NAMES if FAMILIES[FAMILY_OF[name]].of_unit]
     needed = float(np.log(len(judged) / ALPHA))
     rows: list[PopulationRow] = []
     for name in judged:
@@ -51,11 +51,11 @@ def _first_calibrations(archive: Archive, runs: list[str]) -> Iterator[Calibrati
             made = read_calibration(run.table("coefficients"), run.table("covariance"))
         except TumblelineError:
             continue
-        new = [place for place, unit in enumerate(made.units) if unit not in seen]
+        new = [row for row, unit in enumerate(made.units) if unit not in seen]
         seen |= set(made.units)
         if new:
             values, covariance = made.coefficients[new], made.covariance[new]
-            units = tuple(made.units[place] for place in new)
+            units = tuple(made.units[row] for row in new)
             yield replace(made, units=units, coefficients=values, covariance=covariance)
 
 
@@ -70,10 +70,10 @@ def correlations(calibrations: Iterable[Calibration]) -> list[PopulationRow]:
     for (model, axes), sums in of_model.items():
         names = column_names(model, {}, axes)
         for pair in sums.found(ALPHA / len(of_model)):
-            one, other = (" ".join(names[pair.axis][place]) for place in (pair.first, pair.second))
+            first, second = (" ".join(names[pair.axis][column]) for column in (pair.first, pair.second))
             axis = AXES[axes[pair.axis]]
-            detail = {"with": f"{other} {axis}", "correlation": pair.value, "u": pair.error, "units": sums.units}
+            detail = {"with": f"{second} {axis}", "correlation": pair.value, "u": pair.error, "units": sums.units}
             rows.append(
-                {"figure": f"{one} {axis}", "kind": "correlation", "log_e": round(pair.log_e, 2), "detail": detail}
+                {"figure": f"{first} {axis}", "kind": "correlation", "log_e": round(pair.log_e, 2), "detail": detail}
             )
     return rows

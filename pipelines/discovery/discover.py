@@ -22,7 +22,7 @@ from schemas.units import MICRO
 
 @dataclass(frozen=True)
 class Look:
-    """What is asked of an archive.
+    """The options of a look at an archive.
 
     device : kind of device; that of most runs if empty · since : only lots from this day on; nothing is kept then
     drivers : only discoveries of these; all if empty · effects : in the model of every lot beside its own

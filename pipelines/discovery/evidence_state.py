@@ -30,13 +30,13 @@ _LAYOUT = 2  # of the state on disk
 
 @dataclass(frozen=True)
 class Alarm:
-    """Evidence beyond the threshold: driver, place of the hypothesis, night of the first time.
+    """Evidence beyond the threshold: driver, index of the hypothesis, night of the first time.
 
-    place : axes × columns of the sensor, then its effects as wholes, then columns of the station
+    index : axes × columns of the sensor, then its effects as wholes, then columns of the station
     """
 
     driver: str
-    place: int
+    index: int
     night: int
     lots: int
     log_e: float
@@ -64,8 +64,8 @@ class Evidences:
 
     def unknown(self, alarms: Iterable[Alarm]) -> list[Alarm]:
         """Alarms for hypotheses that have none yet."""
-        known = {(alarm.driver, alarm.place) for alarm in self.alarms}
-        return [alarm for alarm in alarms if (alarm.driver, alarm.place) not in known]
+        known = {(alarm.driver, alarm.index) for alarm in self.alarms}
+        return [alarm for alarm in alarms if (alarm.driver, alarm.index) not in known]
 
     def needed(self, driver: str, *, of_station: bool = False) -> Array:
         """Logarithm of the evidence from which on each hypothesis of a driver counts.
@@ -83,9 +83,11 @@ class Evidences:
             return np.full(len(self.of_station), np.log(len(self.of_station) / share))
         of_column = numbered(self.columns)
         columns = np.bincount(of_column)
-        whole = np.where(columns > _MOST_COLUMNS, 0.0, 0.5)
-        each = np.concatenate([np.tile(((1.0 - whole) / (AXES * columns))[of_column], AXES), whole])
-        return np.where(each > 0.0, np.log(columns.size / share) - np.log(np.where(each > 0.0, each, 1.0)), np.inf)
+        effect_share = np.where(columns > _MOST_COLUMNS, 0.0, 0.5)
+        shares = np.concatenate([np.tile(((1.0 - effect_share) / (AXES * columns))[of_column], AXES), effect_share])
+        return np.where(
+            shares > 0.0, np.log(columns.size / share) - np.log(np.where(shares > 0.0, shares, 1.0)), np.inf
+        )
 
     @property
     def least_needed(self) -> float:
@@ -104,14 +106,14 @@ def below(parts: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     return {name.removeprefix(prefix): value for name, value in parts.items() if name.startswith(prefix)}
 
 
-def hypothesis(state: Evidences, place: int) -> tuple[str, int, str]:
+def hypothesis(state: Evidences, index: int) -> tuple[str, int, str]:
     """Effect, column and axis of a hypothesis; no axis for one of the station, and no column (-1) for an effect as a whole."""
-    if place >= state.sensor.size:
-        effect, column = state.of_station[place - state.sensor.size]
+    if index >= state.sensor.size:
+        effect, column = state.of_station[index - state.sensor.size]
         return effect, column, ""
-    if place >= state.sensor.count:
-        return list(dict.fromkeys(name for name, _ in state.columns))[place - state.sensor.count], -1, ""
-    axis, at = divmod(place, len(state.columns))
+    if index >= state.sensor.count:
+        return list(dict.fromkeys(name for name, _ in state.columns))[index - state.sensor.count], -1, ""
+    axis, at = divmod(index, len(state.columns))
     effect, column = state.columns[at]
     return effect, column, "xyz"[axis]
 
@@ -126,7 +128,7 @@ def state_bytes(state: Evidences) -> bytes:
         "drivers": np.array(list(state.generations), dtype=np.str_),
         "generations": np.array(list(state.generations.values()), dtype=np.int64),
         "alarm_drivers": np.array([a.driver for a in state.alarms], dtype=np.str_),
-        "alarms": np.array([(a.place, a.night, a.lots, a.log_e) for a in state.alarms], dtype=float).reshape(-1, 4),
+        "alarms": np.array([(a.index, a.night, a.lots, a.log_e) for a in state.alarms], dtype=float).reshape(-1, 4),
         "night": np.array(state.night),
         "layout": np.array(_LAYOUT),
     }
@@ -142,12 +144,12 @@ def state_bytes(state: Evidences) -> bytes:
 
 def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mapping[str, Any]]) -> Evidences | None:
     """The state on disk; None where it is not that of the last night, or of other hypotheses."""
-    place = folder / "state"
-    if not nights or not place.is_file():
+    path = folder / "state"
+    if not nights or not path.is_file():
         return None
-    data, standing = derived.unframed(place)
+    data, standing = derived.unframed(path)
     if standing == derived.EDITED:
-        derived.warn_of_edits(place)
+        derived.warn_of_edits(path)
     if standing != derived.SOUND or files.hash_of(data) != nights[-1]["state"] or nights[-1]["lots"] < FIRST:
         return None
     with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
@@ -158,7 +160,7 @@ def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mappi
         return None
     if [f"{name} {column}" for name, column in (*sensor, *station)] != [*about["columns"], *about["of_station"]]:
         return None
-    if any(str(run) not in source.store.place for run in about["order"]):
+    if any(str(run) not in source.store.rows for run in about["order"]):
         return None
     order = [str(run) for run in about["order"]]
     return Evidences(
@@ -171,8 +173,8 @@ def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mappi
         taken_out=[str(run) for run in about["taken_out"]],
         generations={str(name): int(n) for name, n in zip(about["drivers"], about["generations"], strict=True)},
         alarms=[
-            Alarm(str(driver), int(place), int(night), int(lots), float(log_e))
-            for driver, (place, night, lots, log_e) in zip(about["alarm_drivers"], about["alarms"], strict=True)
+            Alarm(str(driver), int(index), int(night), int(lots), float(log_e))
+            for driver, (index, night, lots, log_e) in zip(about["alarm_drivers"], about["alarms"], strict=True)
         ],
         night=int(about["night"]),
     )

@@ -31,10 +31,10 @@ def by_axis(name: Name) -> list[float]:
 
 def _squares(name: Name) -> tuple[Array, Array, Array]:
     """Shares of the levels (g, 1); errors of the sizes, zero where one is not known, and their squares less noise, (g, axes)."""
-    there = np.isfinite(name.errors)
-    errors = np.where(there, name.errors, 0.0)
+    finite = np.isfinite(name.errors)
+    errors = np.where(finite, name.errors, 0.0)
     weight = name.weights / max(float(name.weights.sum()), 1e-300)
-    return weight[:, None], errors, np.where(there, name.sizes**2 - errors**2, 0.0)
+    return weight[:, None], errors, np.where(finite, name.sizes**2 - errors**2, 0.0)
 
 
 def size_of(name: Name) -> tuple[float, float, float]:
@@ -66,24 +66,24 @@ def station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
     """Size of a column at each station and its standard error at the stated noise."""
     table = station.levels[STATION]
     out: dict[str, tuple[float, float]] = {}
-    for label, place in table.place.items():
-        information = max(float(table.information[place, at]), 1e-300)
-        out[label] = float(table.score[place, at] / information), float(1.0 / np.sqrt(information))
+    for label, row in table.place.items():
+        information = max(float(table.information[row, at]), 1e-300)
+        out[label] = float(table.score[row, at] / information), float(1.0 / np.sqrt(information))
     return out
 
 
 def without_largest(carried: Array) -> float:
     """Evidence of contributions without the two per cent that speak most."""
-    kept = np.sort(carried)[: max(1, int(0.98 * carried.size))]
+    rest = np.sort(carried)[: max(1, int(0.98 * carried.size))]
     sums = Sums.of(1, two_sided=False)
-    rms = float(np.sqrt(np.mean(kept**2))) or 1.0
-    for value in kept / rms:
+    rms = float(np.sqrt(np.mean(rest**2))) or 1.0
+    for value in rest / rms:
         sums.add(np.array([value]))
     return float(sums.log_e[0])
 
 
 def next_of(driver: str, scope: Scope) -> str:
-    """What to measure or do next."""
+    """The next action: a measurement, or a change of the model."""
     if scope == "sensor_or_station":
         return "measure some of the same units on another station: what stays with the units is theirs"
     if driver == SLOT:
@@ -103,7 +103,7 @@ _SCOPES = {
 
 
 def headline(row: DiscoveryRow) -> str:
-    """What, by what, how large, since when."""
+    """Effects, driver, size and first night of a discovery in one line."""
     effects = " or ".join(row["effects"][:3]) + (" or …" if len(row["effects"]) > 3 else "")
     what = "is common to all lots" if row["kind"] == "mean" else f"{_KINDS[row['kind']]} {' or '.join(row['drivers'])}"
     low, high = row["interval_ug"]
@@ -115,7 +115,7 @@ def headline(row: DiscoveryRow) -> str:
 
 
 def scope_text(row: DiscoveryRow) -> str:
-    """Whose it is and why that is said, with the level that differs most."""
+    """Scope of a discovery and its reason, with the level that differs most."""
     text = f"{_SCOPES[row['scope']]}: {row['because']}"
     if row["kind"] == "levels" and row["levels"]:
         top = row["levels"][0]

@@ -1,4 +1,4 @@
-"""What the evidence of an archive amounts to: named discoveries with size, scope and what carries them, and what is held back."""
+"""Findings of the evidence of an archive: named discoveries with size, scope and support, and evidence that is held back."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ _BY_DRIVER: dict[str, tuple[Scope, str]] = {
     SLOT: ("station", "it stays with the slot of the fixture while the units change"),
     UNIT: ("sensor", "the same unit shows it again, beside other units of its lot"),
 }
-"""Whose a discovery is by its driver alone, and why."""
+"""Scope of a discovery that follows from its driver alone, and the reason."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Findings(Alarms):
     @cached_property
     def _of_sensor(self) -> list[Alarm]:
         """Open alarms of the devices' effects and of functions of the pose; those of the thermometer stand apart."""
-        of_devices = (alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.size)
+        of_devices = (alarm for alarm in self.open_alarms if alarm.index < self.state.sensor.size)
         return [alarm for alarm in of_devices if plain(alarm.driver) != OWN_TEMPCO]
 
     @cached_property
@@ -105,10 +105,10 @@ class Findings(Alarms):
             raised = {plain(a.driver) for a in alarms}
             drivers = tuple(driver for driver in name.drivers if driver in raised) or (name.drivers[0],)
             out.append(Discovery(name, since, drivers, *self._carried(name, since)))
-        return sorted(out, key=lambda one: one.since.lots)
+        return sorted(out, key=lambda discovery: discovery.since.lots)
 
-    def _places(self, effect: str) -> NDArray[np.intp]:
-        """Places of the hypotheses of an effect, of every axis."""
+    def _indices(self, effect: str) -> NDArray[np.intp]:
+        """Indices of the hypotheses of an effect on all axes, (3·columns,)."""
         k = len(self.state.columns)
         return np.concatenate([axis * k + self.pool.places(effect) for axis in range(AXES)])
 
@@ -182,9 +182,11 @@ class Findings(Alarms):
         of_thermometer = {self.effect_of(alarm) for alarm in self.of_thermometer} & set(name.effects)
         scope, because = ("thermometer", PROPORTIONAL) if of_thermometer else self._scope(found)
         driver = found.drivers[0] if name.drivers[0] not in found.drivers else name.drivers[0]
-        sums = [of for one, of in self.state.sensor.drivers.items() if plain(one) in found.drivers]
-        places = [*self._places(name.effects[0]), self.state.sensor.count + self.pool.effects.index(name.effects[0])]
-        log_e = max(float(of.log_e[places].max()) for of in sums)
+        sums = [
+            driver_sums for driver, driver_sums in self.state.sensor.drivers.items() if plain(driver) in found.drivers
+        ]
+        indices = [*self._indices(name.effects[0]), self.state.sensor.count + self.pool.effects.index(name.effects[0])]
+        log_e = max(float(driver_sums.log_e[indices].max()) for driver_sums in sums)
         sizes = by_axis(name)
         row: DiscoveryRow = {
             "id": "",
@@ -217,7 +219,7 @@ class Findings(Alarms):
         return row
 
     def _scope(self, found: Discovery) -> tuple[Scope, str]:
-        """Whether the sensor or the station has it, and why that is said."""
+        """Scope of a discovery (sensor, station, or either), and its reason."""
         driver, stations = found.drivers[0], len(self.state.sensor.wander.stations)
         if driver in _BY_DRIVER:
             return _BY_DRIVER[driver]
@@ -230,7 +232,7 @@ class Findings(Alarms):
             )
         if driver not in {MEAN, DATE, SEASON}:
             return "sensor", "lots of other stations predict it; a station's own wander is no news there"
-        if self.state.sensor.shared_by_stations()[self._places(found.name.effects[0])].any():
+        if self.state.sensor.shared_by_stations()[self._indices(found.name.effects[0])].any():
             return "sensor", f"all {stations} stations show it, and they differ by less than it"
         return "sensor_or_station", f"{stations} stations are too few to exclude permanent errors of their references"
 
@@ -239,14 +241,14 @@ class Findings(Alarms):
         """Alarms of the station's own columns, the strongest of each effect and driver."""
         best: dict[tuple[str, str], Alarm] = {}
         for alarm in self.open_alarms:
-            if alarm.place >= self.state.sensor.size:
+            if alarm.index >= self.state.sensor.size:
                 key = self.effect_of(alarm), alarm.driver
-                best[key] = max(best.get(key, alarm), alarm, key=lambda one: one.log_e)
-        kept: dict[str, Alarm] = {}
+                best[key] = max(best.get(key, alarm), alarm, key=lambda alarm: alarm.log_e)
+        strongest: dict[str, Alarm] = {}
         # columns of one table are nearly the same: the strongest stands for its driver
         for alarm in sorted(best.values(), key=lambda alarm: -self.log_e(alarm)):
-            kept.setdefault(alarm.driver, alarm)
-        return sorted(kept.values(), key=lambda alarm: alarm.lots)
+            strongest.setdefault(alarm.driver, alarm)
+        return sorted(strongest.values(), key=lambda alarm: alarm.lots)
 
     def _held(self) -> list[HeldAlarm]:
         reason = "the stations differ or wander in this effect by themselves, and it is the same for a whole lot"
@@ -255,21 +257,21 @@ class Findings(Alarms):
         rows: list[HeldAlarm] = []
         for alarm in self.state.alarms:
             if held(self.state, alarm):
-                effect, _, axis = hypothesis(self.state, alarm.place)
+                effect, _, axis = hypothesis(self.state, alarm.index)
                 log_e = round(self.log_e(alarm), 2)
                 rows.append({"effect": effect, "axis": axis, "driver": alarm.driver, "log_e": log_e, "reason": reason})
         return sorted(rows, key=lambda row: -row["log_e"])
 
     def _unexplained(self, *, named: bool) -> list[UnexplainedRow]:
         """Functions of the pose that no effect is; and, where nothing is named, every driver with an alarm."""
-        rows = {of.driver: self._map_row(of) for of in self._named[1]}
+        rows = {unnamed.driver: self._map_row(unnamed) for unnamed in self._named[1]}
         for alarm in [] if named else sorted(self._of_sensor, key=self.log_e, reverse=True):
-            effect, _, axis = hypothesis(self.state, alarm.place)
+            effect, _, axis = hypothesis(self.state, alarm.index)
             rows.setdefault(plain(alarm.driver), self._unnamed_row(plain(alarm.driver), axis, effect))
         return list(rows.values())
 
     def _unnamed_row(self, driver: str, axis: str, nearest: str) -> UnexplainedRow:
-        """What differs by a driver without a map of it."""
+        """The row of a difference by a driver that no effect explains, without a map."""
         alarms = [a for a in self._of_sensor if plain(a.driver) == driver]
         since = min(alarms, key=lambda a: a.lots)
         return {
@@ -284,19 +286,21 @@ class Findings(Alarms):
             "nearest": nearest,
         }
 
-    def _map_row(self, of: Unnamed) -> UnexplainedRow:
-        """What is left by a driver over the poses of the newest lot, on the axis where it stands out most."""
+    def _map_row(self, unnamed: Unnamed) -> UnexplainedRow:
+        """That row with a map over the poses of the newest lot, on the axis where the difference is clearest."""
         force = self.source.poses(self.state.order[-1])
-        maps = [map_of(force, *fit) for fit in zip(of.size, of.covariance, strict=True)]
+        maps = [map_of(force, *fit) for fit in zip(unnamed.size, unnamed.covariance, strict=True)]
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
-        row = self._unnamed_row(of.driver, "xyz"[best], self._nearest(of.driver))
-        row["level"] = of.level
+        row = self._unnamed_row(unnamed.driver, "xyz"[best], self._nearest(unnamed.driver))
+        row["level"] = unnamed.level
         row["map"] = np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist()
         return row
 
     def _nearest(self, driver: str) -> str:
         """The effect of the catalogue with the largest evidence by a driver."""
-        log_e = np.max([of.log_e for name, of in self.state.sensor.drivers.items() if plain(name) == driver], axis=0)
+        log_e = np.max(
+            [sums.log_e for name, sums in self.state.sensor.drivers.items() if plain(name) == driver], axis=0
+        )
         places = [at for at in range(log_e.size) if hypothesis(self.state, at)[0] != SHAPE]
         return hypothesis(self.state, max(places, key=lambda at: float(log_e[at])))[0]
 
@@ -306,30 +310,30 @@ class Findings(Alarms):
         if lots < FIRST:
             return []
         between, within = state.sensor.noise
-        own = np.mean([lot.own.sum(axis=0) for lot in self.some], axis=0) * lots
+        inside = np.mean([lot.own.sum(axis=0) for lot in self.some], axis=0) * lots
         times = np.sqrt(2.0 * (state.least_needed + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
         rows: list[ReachRow] = []
-        for driver, information, noise in ((MEAN, state.sensor.information, between), ("inside lots", own, within)):
+        for driver, information, noise in ((MEAN, state.sensor.information, between), ("inside lots", inside, within)):
             seen = information > 0.0
             sizes = np.where(seen, times * noise / np.sqrt(np.where(seen, information, 1.0)) * self.pool.size, np.nan)
             for effect in self.pool.effects:
-                own_sizes = sizes[self._places(effect)]
-                there = own_sizes[np.isfinite(own_sizes) & (own_sizes > 0.0)]
-                if there.size:
-                    smallest = MICRO * float(np.median(there))
+                of_effect = sizes[self._indices(effect)]
+                visible = of_effect[np.isfinite(of_effect) & (of_effect > 0.0)]
+                if visible.size:
+                    smallest = MICRO * float(np.median(visible))
                     needed = max(FIRST, int(np.ceil(lots * smallest**2)))
                     rows.append({"effect": effect, "driver": driver, "smallest_ug": smallest, "lots_to_1_ug": needed})
         return rows
 
     def _unseen(self) -> list[documents.UntoldEffect]:
         information = self.state.sensor.information.reshape(AXES, -1)
-        own = sum((lot.own.sum(axis=0) for lot in self.some), np.zeros(self.state.sensor.count)).reshape(AXES, -1)
+        inside = sum((lot.own.sum(axis=0) for lot in self.some), np.zeros(self.state.sensor.count)).reshape(AXES, -1)
         if len(self.state.order) < FIRST:
             return []
         alone, nowhere = "the errors of the station have the same columns", "no lot excites it"
         places = {effect: self.pool.places(effect) for effect in self.pool.effects}
         return [
-            {"effect": effect, "reason": alone if own[:, at].any() else nowhere}
+            {"effect": effect, "reason": alone if inside[:, at].any() else nowhere}
             for effect, at in places.items()
             if not information[:, at].any()
         ]
@@ -337,10 +341,10 @@ class Findings(Alarms):
     def _drivers(self) -> list[DriverRow]:
         judged = list(dict.fromkeys(map(plain, self.state.sensor.drivers)))
         rows: list[DriverRow] = [{"name": name, "status": "judged"} for name in judged]
-        known = [of for by in (self.source.attributes.serial, self.source.attributes.run) for of in by.values()]
+        known = [values for by in (self.source.attributes.serial, self.source.attributes.run) for values in by.values()]
         for name in self.source.attributes.names():
             if name not in judged:
-                levels = {value for of in known if (value := of.get(name))}
+                levels = {value for values in known if (value := values.get(name))}
                 status = "one level" if len(levels) < 2 else "no unit of a pooled lot has it"
                 rows.append({"name": name, "status": status})
         return rows

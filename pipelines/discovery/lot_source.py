@@ -30,11 +30,11 @@ Column = tuple[str, int]
 SEASON, OPERATOR = "season", "operator"
 OWN_TEMPCO = "own temperature coefficient"
 """A driver: what a unit's thermometer has wrong, its output has wrong by this."""
-_PLACES = 3  # of a force in g, within which poses are the same
+_DECIMALS = 3  # of a force in g, to which poses are the same
 
 
 class DiscoveryArchive:
-    """What the discovery of an archive works on.
+    """The lots of an archive as the discovery takes them.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class DiscoveryArchive:
     def other_devices(self) -> dict[str, int]:
         """Runs of other kinds of devices, which are never pooled with it."""
         counts = Counter(info.device for info in self.infos)
-        return {one: count for one, count in counts.items() if one != self.device}
+        return {device: count for device, count in counts.items() if device != self.device}
 
     def score(self, workers: int, distribute: Distributor | None = None) -> int:
         """Score what is new; the number of runs."""
@@ -95,13 +95,13 @@ class DiscoveryArchive:
 
     @cached_property
     def attributes(self) -> Attributes:
-        """What is known of units and runs."""
+        """The attributes of units and runs."""
         return known_attributes(self.archive)
 
     @cached_property
     def revoked(self) -> set[str]:
         """Runs of which a calibration was revoked."""
-        return {one.run for one in Ledger(self.archive).all() if one.state == "revoked"}
+        return {calibration.run for calibration in Ledger(self.archive).all() if calibration.state == "revoked"}
 
     def pooled(self) -> list[str]:
         """Runs of the device that have scores, in the order of arrival."""
@@ -113,14 +113,14 @@ class DiscoveryArchive:
 
     def _reasons(self) -> Iterator[tuple[str, str]]:
         """Runs of the device with scores, in the order of arrival, with the reason for one that is left out."""
-        heads = ((run, self.store.head(run)) for run in self.store.place)
+        heads = ((run, self.store.head(run)) for run in self.store.rows)
         return ((run, str(head["left_out"] or "")) for run, head in heads if head["device"] == self.device)
 
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
         """Columns of the sensor and of the station that any run of the archive has."""
         sensor = dict.fromkeys(column for products in self.store.products for column in products.columns)
-        station = dict.fromkeys(one for products in self.store.products for one in products.of_station)
+        station = dict.fromkeys(column for products in self.store.products for column in products.of_station)
         return tuple(sensor), tuple(station)
 
     def lots(self, runs: Iterable[str]) -> Iterable[tuple[ScoredLot, ScoredLot]]:
@@ -133,14 +133,14 @@ class DiscoveryArchive:
         """A run as a lot, in the order of the archive's hypotheses."""
         if run.score is None or run.own is None or run.information is None:
             raise LookupError(run.run)
-        place = {column: at for at, column in enumerate(self.columns[0])}
-        at = np.array([place[column] for column in run.columns])
+        index = {column: at for at, column in enumerate(self.columns[0])}
+        at = np.array([index[column] for column in run.columns])
         k, own_k = len(self.columns[0]), len(run.columns)
-        here = (np.arange(AXES)[:, None] * k + at).reshape(-1)
+        indices = (np.arange(AXES)[:, None] * k + at).reshape(-1)
 
         def spread(values: Array) -> Array:
             out = np.zeros((*values.shape[:-1], AXES * k))
-            out[..., here] = values.reshape(*values.shape[:-1], AXES * own_k)
+            out[..., indices] = values.reshape(*values.shape[:-1], AXES * own_k)
             return out
 
         levels, numbers = self._drivers(run)
@@ -162,11 +162,11 @@ class DiscoveryArchive:
         return self._change(lot)
 
     def _of_station(self, run: ScoredRun) -> ScoredLot:
-        place = {column: at for at, column in enumerate(self.columns[1])}
-        both = np.zeros((2, len(place)))
+        index = {column: at for at, column in enumerate(self.columns[1])}
+        sums = np.zeros((2, len(index)))
         if run.station_scores is not None:
-            both[:, [place[column] for column in run.of_station]] = run.station_scores
-        score, information = both
+            sums[:, [index[column] for column in run.of_station]] = run.station_scores
+        score, information = sums
         return ScoredLot(run.run, run.station, _day(run.when), ("",), score[None], information[None], information)
 
     def _drivers(self, run: ScoredRun) -> tuple[dict[str, tuple[str, ...]], dict[str, Array]]:
@@ -192,12 +192,12 @@ class DiscoveryArchive:
         for name in self.attributes.names():
             if name in {MEAN, STATION, SLOT, UNIT, "date"}:
                 continue
-            every = (of.values() for of in (self.attributes.serial, self.attributes.run))
+            every = (by_key.values() for by_key in (self.attributes.serial, self.attributes.run))
             out[name] = as_numbers([value.get(name, "") for values in every for value in values])
         return out
 
     def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:
-        """What earlier measurements of a unit say, inside their lots.
+        """A function that gives score and information of earlier measurements of a unit, inside their lots.
 
         Parameters
         ----------
@@ -209,15 +209,15 @@ class DiscoveryArchive:
         def of(unit: str, taken: int) -> tuple[Array, Array] | None:
             nonlocal known
             for number in range(known, len(order)):
-                for one in self.store.head(order[number])["units"]:
-                    there = index.setdefault(one, number)
-                    if isinstance(there, list):
-                        there.append(number)
-                    elif there != number:
-                        index[one] = [there, number]
+                for serial in self.store.head(order[number])["units"]:
+                    lot_numbers = index.setdefault(serial, number)
+                    if isinstance(lot_numbers, list):
+                        lot_numbers.append(number)
+                    elif lot_numbers != number:
+                        index[serial] = [lot_numbers, number]
             known = len(order)
-            places = index.get(unit, [])
-            before = [order[k] for k in (places if isinstance(places, list) else [places]) if k < taken]
+            lots_of = index.get(unit, [])
+            before = [order[k] for k in (lots_of if isinstance(lots_of, list) else [lots_of]) if k < taken]
             if not before:
                 return None
             lots = (self.lot_of(self.store.run(run)) for run in before)
@@ -229,10 +229,10 @@ class DiscoveryArchive:
     def poses(self, run: str) -> Array:
         """Forces (n, 3), g, of the poses of a run, each once."""
         force = measured(Run(self.archive, run).table("dwells")).state.force.reshape(-1, 3)
-        return np.unique(np.round(force, _PLACES), axis=0)
+        return np.unique(np.round(force, _DECIMALS), axis=0)
 
     def folder(self) -> Place:
-        """Where the evidence of the device is kept."""
+        """Folder of the evidence of the device."""
         return self.archive.root / FOLDER / re.sub(r"[^A-Za-z0-9._-]", "_", self.device)
 
 

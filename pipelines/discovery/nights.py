@@ -54,39 +54,39 @@ def grown_by_days(source: DiscoveryArchive, state: Evidences, runs: Sequence[str
         generation = 1 + max(state.generations.values(), default=-1)
         for driver in state.sensor.drivers:
             state.generations.setdefault(driver, generation)
-        state.alarms += state.unknown(_beyond(state))
+        state.alarms += state.unknown(_raised(state))
     return state
 
 
-def _beyond(state: Evidences) -> list[Alarm]:
-    """Hypotheses beyond the threshold; those of the station have places after those of the sensor."""
+def _raised(state: Evidences) -> list[Alarm]:
+    """Hypotheses beyond the threshold; the indices of those of the station follow those of the sensor."""
     out: list[Alarm] = []
     for evidence, of_station in ((state.sensor, False), (state.station, True)):
         for driver, sums in evidence.drivers.items():
             if of_station and driver not in STATION_DRIVERS:
                 continue
             log_e = sums.log_e
-            for place in np.flatnonzero(log_e >= state.needed(driver, of_station=of_station)):
-                at = int(place) + (state.sensor.size if of_station else 0)
-                out.append(Alarm(driver, at, state.night, len(state.order), float(log_e[place])))
+            for index in np.flatnonzero(log_e >= state.needed(driver, of_station=of_station)):
+                at = int(index) + (state.sensor.size if of_station else 0)
+                out.append(Alarm(driver, at, state.night, len(state.order), float(log_e[index])))
     return out
 
 
 def held(state: Evidences, alarm: Alarm) -> bool:
-    """Whether an alarm may be the station's own: the same for a whole lot, of an effect that wanders or differs with stations."""
+    """Whether the station may cause an alarm: the driver is common to a lot, the effect wanders or differs between stations."""
     sensor, wander = state.sensor, state.sensor.wander
-    if alarm.place >= sensor.size or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT, STATION}:
+    if alarm.index >= sensor.size or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT, STATION}:
         return False  # of a station, for good or by wander: stations differ
     if alarm.driver == MEAN:
         of_station = ~sensor.shared_by_stations() | sensor.guarded
     else:
         walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
         of_station = walk > WALK_FROM
-    if alarm.place < sensor.count or sensor.effects is None:
-        return bool(of_station[alarm.place])
+    if alarm.index < sensor.count or sensor.effects is None:
+        return bool(of_station[alarm.index])
     # of an effect as a whole: where columns and axes that would be held back carry more than a fifth
-    own, sums = sensor.effects == alarm.place - sensor.count, sensor.drivers[alarm.driver]
-    carried = own * over(sums.s[: sensor.count] ** 2, sums.v[: sensor.count])
+    of_effect, sums = sensor.effects == alarm.index - sensor.count, sensor.drivers[alarm.driver]
+    carried = of_effect * over(sums.s[: sensor.count] ** 2, sums.v[: sensor.count])
     return float(carried[of_station].sum()) > _MOST_HELD * float(carried.sum())
 
 
@@ -100,13 +100,13 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
             state = _replayed(source, nights)
         gone = [run for run in state.order if run in source.revoked]
         if gone:
-            kept = [run for run in state.order if run not in source.revoked]
-            grown = grown_by_days(source, fresh(source), kept)
+            remaining = [run for run in state.order if run not in source.revoked]
+            grown = grown_by_days(source, fresh(source), remaining)
             grown.taken_out, grown.night = [*state.taken_out, *gone], state.night
             grown.alarms = [*state.alarms, *state.unknown(grown.alarms)]
             state = grown
-        there = {*state.order, *state.taken_out}
-        new = [run for run in source.pooled() if run not in there and run not in source.revoked]
+        counted = {*state.order, *state.taken_out}
+        new = [run for run in source.pooled() if run not in counted and run not in source.revoked]
         if new or gone:
             before = state.night
             state = grown_by_days(source, state, new)
@@ -117,8 +117,8 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
 def _nights(folder: Place) -> list[dict[str, Any]]:
     """The ledger's entries in order."""
     top = folder / "nights"
-    places = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
-    return [files.read_json(place) for place in places if place.name.endswith(".json")]
+    paths = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
+    return [files.read_json(path) for path in paths if path.name.endswith(".json")]
 
 
 def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> Evidences:
@@ -126,16 +126,16 @@ def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> 
     state = fresh(source)
     out = {run for night in nights for run in night["taken_out"]}
     for night in nights:
-        runs = [run for run in night["runs"] if run in source.store.place and run not in out]
+        runs = [run for run in night["runs"] if run in source.store.rows and run not in out]
         state = grown_by_days(source, state, runs)
     state.taken_out = [run for night in nights for run in night["taken_out"]]
     # an alarm that was raised stays, also where a run that carried it was taken out since
-    place = {_text_of(state, at): at for at in range(state.sensor.size + state.station.count)}
+    index = {_text_of(state, at): at for at in range(state.sensor.size + state.station.count)}
     state.alarms += state.unknown(
-        Alarm(told["driver"], place[told["column"]], night["night"], told["lots"], told["log_e"])
+        Alarm(alarm["driver"], index[alarm["column"]], night["night"], alarm["lots"], alarm["log_e"])
         for night in nights
-        for told in night["alarms"]
-        if told["column"] in place
+        for alarm in night["alarms"]
+        if alarm["column"] in index
     )
     return state
 
@@ -158,7 +158,7 @@ def _write(
         "lots": len(state.order),
         "hypotheses": len(state.sensor.drivers) * state.sensor.size + len(STATION_DRIVERS) * state.station.count,
         "alarms": [
-            {"driver": a.driver, "column": _text_of(state, a.place), "lots": a.lots, "log_e": round(a.log_e, 2)}
+            {"driver": a.driver, "column": _text_of(state, a.index), "lots": a.lots, "log_e": round(a.log_e, 2)}
             for a in state.alarms
             if a.night > before
         ],
@@ -170,8 +170,8 @@ def _write(
     files.publish(folder / "state", derived.framed(data))
 
 
-def _text_of(state: Evidences, place: int) -> str:
-    effect, column, axis = hypothesis(state, place)
+def _text_of(state: Evidences, index: int) -> str:
+    effect, column, axis = hypothesis(state, index)
     return f"{effect}.{column}" + (f".{axis}" if axis else "") if column >= 0 else effect
 
 
@@ -181,7 +181,7 @@ _GROWN = 1.05  # more lots than this factor: the names are found again
 
 def alarm_key(state: Evidences) -> list[str]:
     """The alarms of a state as text: while they are the same, so are the names."""
-    return sorted(f"{alarm.driver} {alarm.place}" for alarm in state.alarms if not held(state, alarm))
+    return sorted(f"{alarm.driver} {alarm.index}" for alarm in state.alarms if not held(state, alarm))
 
 
 def found_before(source: DiscoveryArchive, state: Evidences) -> tuple[list[DiscoveryRow], list[UnexplainedRow]] | None:
@@ -198,18 +198,18 @@ def found_before(source: DiscoveryArchive, state: Evidences) -> tuple[list[Disco
 def discovered_before(archive: Archive) -> list[tuple[str, int]]:
     """Kinds of devices with discoveries of an earlier look, named or not, and their number; nothing is judged."""
     top = archive.root / FOLDER
-    places = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
-    found = {place.name: _found(place) for place in places if place.name not in {"scores", "lock"}}
+    folders = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
+    found = {folder.name: _found(folder) for folder in folders if folder.name not in {"scores", "lock"}}
     counts = {name: len(stored["discoveries"]) + len(stored["unexplained"]) for name, stored in found.items() if stored}
     return [(name, count) for name, count in counts.items() if count]
 
 
 def _found(folder: Place) -> dict[str, Any] | None:
-    """What was found of a kind of device the last time, and of how many lots."""
-    place = folder / "found"
-    if not place.is_file():
+    """The stored findings of a kind of device, and their number of lots; None where there are none."""
+    path = folder / "found"
+    if not path.is_file():
         return None
-    data, standing = derived.unframed(place)
+    data, standing = derived.unframed(path)
     if standing != derived.SOUND:
         return None
     found: dict[str, Any] = json.loads(data)
@@ -234,16 +234,16 @@ def remembered(
     for row in rows:
         row["id"] = ""
     # the same effects first; then what was unexplained and has a name now, or the other way round
-    for alike in (_effects_in_common, lambda old, new: not _effects(old) or not _effects(new)):
+    for matches in (_effects_in_common, lambda old, new: not _effects(old) or not _effects(new)):
         for row in (row for row in rows if not row["id"]):
-            same = next((old for old in left if old["driver"] == row["driver"] and alike(old, row)), None)
-            if same is not None:
-                left.remove(same)
-                row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
+            earlier = next((old for old in left if old["driver"] == row["driver"] and matches(old, row)), None)
+            if earlier is not None:
+                left.remove(earlier)
+                row["id"], row["since"], row["lots_then"] = earlier["id"], earlier["since"], earlier["lots_then"]
     for row in (row for row in rows if not row["id"]):
         row["id"] = f"D{stored['ids'] + len(document['new']) + 1}"
         document["new"].append(row["id"])
-    kept = {
+    found = {
         "version": _VERSION,
         "discoveries": document["discoveries"],
         "unexplained": document["unexplained"],
@@ -254,8 +254,8 @@ def remembered(
     }
     if not keep:
         return document
-    if stored.get("alarms") != kept["alarms"] or kept["lots"] > _GROWN * stored["lots"]:
-        files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(kept), sort_keys=True).encode()))
+    if stored.get("alarms") != found["alarms"] or found["lots"] > _GROWN * stored["lots"]:
+        files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(found), sort_keys=True).encode()))
     return document
 
 

@@ -50,20 +50,21 @@ def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
 
 def levels_chart(row: DiscoveryRow) -> Chart:
     """The levels of a driver in order of size, with 95 % intervals."""
-    levels = sorted(row["levels"][:MOST_LEVELS], key=lambda one: one["size_ug"])
-    place = np.arange(len(levels), dtype=np.float64)
-    size, error = (np.array([one[key] for one in levels]) for key in ("size_ug", "u_ug"))
+    levels = sorted(row["levels"][:MOST_LEVELS], key=lambda entry: entry["size_ug"])
+    position = np.arange(len(levels), dtype=np.float64)
+    size, error = (np.array([entry[key] for entry in levels]) for key in ("size_ug", "u_ug"))
     texts = tuple(
-        f"{one['level']}: {one['size_ug']:.2f} ± {2 * one['u_ug']:.2f} µg, {one['units']} units" for one in levels
+        f"{entry['level']}: {entry['size_ug']:.2f} ± {2 * entry['u_ug']:.2f} µg, {entry['units']} units"
+        for entry in levels
     )
-    traces = (level(place, 0.0), Trace("95 % interval", place, size, error=1.96 * error, size=7.0, texts=texts))
-    axis = PlotAxis(row["driver"], names=tuple(one["level"] for one in levels))
+    traces = (level(position, 0.0), Trace("95 % interval", position, size, error=1.96 * error, size=7.0, texts=texts))
+    axis = PlotAxis(row["driver"], names=tuple(entry["level"] for entry in levels))
     plot = Plot("", axis, PlotAxis(f"{row['recommended']} in a dwell / µg"), traces)
     return Chart(f"{row['recommended']} by {row['driver']}", (plot,), height=280)
 
 
 def map_chart(row: UnexplainedRow) -> Chart:
-    """What differs by a driver and is no effect of the catalogue, over the sphere of the force."""
+    """A difference by a driver that no effect of the catalogue explains, over the sphere of the force."""
     outer, inner, size, error = np.array(row["map"]).T
     force = force_from_angles(np.radians(outer), np.radians(inner))
     texts = tuple(
@@ -78,7 +79,7 @@ def map_chart(row: UnexplainedRow) -> Chart:
 
 
 def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, Chart]:
-    """How the evidence of each discovery came together from lot to lot, by ``grown-<id>``."""
+    """Growth of the evidence of each discovery from lot to lot, by ``grown-<id>``."""
     known = {(discovery.name.effects[0], discovery.drivers[0]): discovery.carried for discovery in findings.discoveries}
     charts: dict[str, Chart] = {}
     for row in document["discoveries"]:
@@ -112,8 +113,8 @@ def strongest_chart(findings: Findings) -> Chart | None:
     for name, sums in state.sensor.drivers.items():
         column = drivers.index(name.removesuffix(INSIDE))
         # what counts from more evidence on is drawn by as much less
-        for place, log_e in enumerate(sums.log_e - state.needed(name) + state.least_needed):
-            row = effects.index(hypothesis(state, place)[0])
+        for index, log_e in enumerate(sums.log_e - state.needed(name) + state.least_needed):
+            row = effects.index(hypothesis(state, index)[0])
             grid[row, column] = max(grid[row, column], log_e / np.log(10.0))
     if grid.max(initial=0.0) <= FAINT:
         return None

@@ -17,13 +17,13 @@ PROPORTIONAL = (
 
 
 def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
-    """What changes the force itself, for all units of a lot alike."""
-    effect, column, _ = hypothesis(known.state, alarm.place)
-    at = alarm.place - known.state.sensor.size
+    """The row of an error of the station, which changes the force itself for all units of a lot."""
+    effect, column, _ = hypothesis(known.state, alarm.index)
+    at = alarm.index - known.state.sensor.size
     station = known.state.station
     sizes = station_sizes(station, at)
     of_driver = [a for a in known.open_alarms if a.driver == alarm.driver]
-    alike = [known.effect_of(a) for a in of_driver if a.place >= known.state.sensor.size]
+    effects = [known.effect_of(a) for a in of_driver if a.index >= known.state.sensor.size]
     scale = float(station.noise[0][at])
     values = np.array([value for value, _ in sizes.values()])
     size, reach = float(np.sqrt(np.mean(values**2))), 2.0 * max(scale * error for _, error in sizes.values())
@@ -31,7 +31,7 @@ def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
         "id": "",
         "since": known.day_of(alarm),
         "lots_then": alarm.lots,
-        "effects": list(dict.fromkeys([effect, *alike])),
+        "effects": list(dict.fromkeys([effect, *effects])),
         "recommended": effect,
         "axes": [],
         "driver": alarm.driver,
@@ -54,19 +54,19 @@ def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
 
 
 def thermometer_row(known: Alarms) -> DiscoveryRow:
-    """What an error of the thermometer does to every unit by its own temperature coefficient."""
+    """The row of an error of the thermometer, which every unit shows by its temperature coefficient."""
     alarms, k = known.of_thermometer, len(known.state.columns)
     effect = known.effect_of(alarms[0])
     sums = known.state.sensor.levels[OWN_TEMPCO + INSIDE]
-    slope, every = (sums.place[label] for label in (SLOPE, ALL))
+    slope, total = (sums.place[label] for label in (SLOPE, ALL))
     information = sums.information[slope]
     # rms over the units: of the coefficient, of its error by the scatter inside lots
-    spread = np.sqrt(over(information, sums.information[every])) * known.pool.size
+    spread = np.sqrt(over(information, sums.information[total])) * known.pool.size
     size = over(sums.score[slope], information) * spread
     error = np.where(information > 0.0, known.state.sensor.noise[1], 0.0) * over(spread, np.sqrt(information))
-    here = np.array([axis * k + known.pool.places(effect)[0] for axis in range(AXES)])
-    rms, wide = (float(np.sqrt(np.mean(of[here] ** 2))) for of in (size, error))
-    sizes = np.abs(size[here])
+    indices = np.array([axis * k + known.pool.places(effect)[0] for axis in range(AXES)])
+    rms, wide = (float(np.sqrt(np.mean(values[indices] ** 2))) for values in (size, error))
+    sizes = np.abs(size[indices])
     return {
         "id": "",
         "since": known.day_of(min(alarms, key=lambda alarm: alarm.lots)),

@@ -70,7 +70,7 @@ class ScoreFile(NamedTuple):
     heads : texts, units and noise of each run · names : columns of the sensor and of the station by their mark
     """
 
-    place: Place
+    path: Place
     heads: list[dict[str, Any]]
     names: dict[str, Any]
 
@@ -87,17 +87,17 @@ class ScoreStore:
     def _all(self) -> tuple[list[ScoreFile], list[Products]]:
         """Every file that is sound, in the order of their making, and the products of all of them."""
         out, products = list[ScoreFile](), dict[Any, Products]()
-        for place in sorted(self._places(), key=lambda one: one.name):
-            data, state = derived.unframed(place)
+        for path in sorted(self._paths(), key=lambda item: item.name):
+            data, state = derived.unframed(path)
             if state == derived.EDITED:
-                derived.warn_of_edits(place)
+                derived.warn_of_edits(path)
             if state != derived.SOUND or (read := _content(data)) is None:
                 continue
             names = _names(read.about)
             heads = read.table.select([*TEXTS, "units", "floor"]).to_pylist()
             for head in heads:  # of a hundred thousand runs, many have the same
                 head.update({name: sys.intern(head[name]) for name in TEXTS if name not in {"run", "when"}})
-            out.append(ScoreFile(place, heads, names))
+            out.append(ScoreFile(path, heads, names))
             with np.load(io.BytesIO(read.products), allow_pickle=False) as arrays:
                 for name in filter(None, names):
                     columns, station, runs = names[name]
@@ -117,7 +117,7 @@ class ScoreStore:
         return self._all[1]
 
     @cached_property
-    def place(self) -> dict[str, tuple[int, int]]:
+    def rows(self) -> dict[str, tuple[int, int]]:
         """File and row of every run, in the order of arrival."""
         found: dict[str, tuple[int, int]] = {}
         for number, file in enumerate(self.files):
@@ -127,17 +127,17 @@ class ScoreStore:
 
     def head(self, run: str) -> dict[str, Any]:
         """The texts of a run: when, station, device, model, why it was left out."""
-        number, row = self.place[run]
+        number, row = self.rows[run]
         return self.files[number].heads[row]
 
     def run(self, run: str) -> ScoredRun:
         """The scores of a run."""
-        number, row = self.place[run]
+        number, row = self.rows[run]
         file = self.files[number]
         if number not in self._opened:
-            read = _content(derived.unframed(file.place)[0])
+            read = _content(derived.unframed(file.path)[0])
             if read is None:
-                raise ArchiveUnusable(f"{file.place}: the scores were changed while they were read; run it again")
+                raise ArchiveUnusable(f"{file.path}: the scores were changed while they were read; run it again")
             while len(self._opened) >= MOST_OPEN:
                 self._opened.pop(next(iter(self._opened)))
             self._opened[number] = read.table
@@ -145,7 +145,7 @@ class ScoreStore:
 
     def add(self, ids: Sequence[str], workers: int, distribute: Distributor | None = None) -> int:
         """Score runs that are not scored yet, in processes; the number of new ones."""
-        new = [one for one in ids if one not in self.place]
+        new = [run_id for run_id in ids if run_id not in self.rows]
         if not new:
             return 0
         parts = [(self.archive.address, new[at : at + BATCH]) for at in range(0, len(new), BATCH)]
@@ -153,14 +153,14 @@ class ScoreStore:
         scored = [run for part in parts_scored for run in part]
         if not scored:
             return 0
-        number = 1 + max((int(place.name.split(".")[0]) for place in self._places()), default=0)
+        number = 1 + max((int(path.name.split(".")[0]) for path in self._paths()), default=0)
         files.publish(self.folder / f"{number:06d}.scores", derived.framed(written(scored)))
         self._opened.clear()
         self.__dict__.pop("_all", None)
-        self.__dict__.pop("place", None)
+        self.__dict__.pop("rows", None)
         return len(scored)
 
-    def _places(self) -> list[Place]:
+    def _paths(self) -> list[Place]:
         return [path for path in self.folder.iterdir() if path.name.endswith(".scores")] if self.folder.is_dir() else []
 
 
@@ -169,16 +169,16 @@ def written(runs: Sequence[ScoredRun]) -> bytes:
     groups: dict[str, list[ScoredRun]] = {}
     for run in runs:
         groups.setdefault(_group(run), []).append(run)
-    products = {name: _products_of(own) for name, own in groups.items() if not own[0].left_out}
+    products = {name: _products_of(group) for name, group in groups.items() if not group[0].left_out}
     columns: dict[str, list[Any]] = {name: [getattr(run, name) for run in runs] for name in TEXTS}
     columns |= {"units": [list(run.units) for run in runs], "slots": [list(run.slots) for run in runs]}
     columns |= {"columns": [_group(run) for run in runs], "floor": [run.floor for run in runs]}
     for name in ("score", "own", "information", "station_scores", "tempco"):
         columns[name] = [_packed(name, run) for run in runs]
     buffer = io.BytesIO()
-    arrays = {f"{name}/{key}": v for name, of in products.items() for key, v in of.items()}
+    arrays = {f"{name}/{key}": v for name, parts in products.items() for key, v in parts.items()}
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    named = {name: [own[0].columns, own[0].of_station, len(own)] for name, own in groups.items()}
+    named = {name: [group[0].columns, group[0].of_station, len(group)] for name, group in groups.items()}
     about = {"version": VERSION, "columns": named}
     table = pa.table(columns).replace_schema_metadata({"about": json.dumps(about).encode()})
     sink = pa.BufferOutputStream()
@@ -225,20 +225,20 @@ def _of_planes(data: bytes) -> Array:
     return np.ascontiguousarray(pairs).view("<i2").astype(np.float64).reshape(-1)
 
 
-def _logarithms(ratio: Array, steps: float, one: int) -> NDArray[np.uint8]:
-    """Ratios as logarithms in one byte, of which ``one`` is a ratio of one; zero is zero."""
-    code = np.round(steps * np.log2(np.clip(ratio, 1e-30, None))) + one
+def _logarithms(ratio: Array, steps: float, unity: int) -> NDArray[np.uint8]:
+    """Ratios as logarithms in one byte, ``unity`` is the code of a ratio of one; zero is zero."""
+    code = np.round(steps * np.log2(np.clip(ratio, 1e-30, None))) + unity
     return np.where(ratio > 0.0, np.clip(code, 1, 255), 0).astype(np.uint8)
 
 
-def _of_logarithms(code: NDArray[np.uint8], steps: float, one: int) -> Array:
-    return np.where(code > 0, 2.0 ** ((code.astype(np.float64) - one) / steps), 0.0)
+def _of_logarithms(code: NDArray[np.uint8], steps: float, unity: int) -> Array:
+    return np.where(code > 0, 2.0 ** ((code.astype(np.float64) - unity) / steps), 0.0)
 
 
 def _products_of(runs: Sequence[ScoredRun]) -> dict[str, NDArray[Any]]:
     arrays = {name: np.mean([getattr(run, name) for run in runs], axis=0) for name in ("lot", "inside", "size")}
-    k, whole = arrays["inside"].shape[-1], _correlated(arrays["lot"])
-    upper, lot = np.triu_indices(k), whole.reshape(AXES, k, AXES, k)
+    k, matrix = arrays["inside"].shape[-1], _correlated(arrays["lot"])
+    upper, lot = np.triu_indices(k), matrix.reshape(AXES, k, AXES, k)
     within = np.stack([lot[axis, :, axis] for axis in range(AXES)])
     across = np.stack([lot[axis, :, axis - 1] for axis in range(AXES)])
     return {
@@ -273,7 +273,7 @@ def _content(data: bytes) -> _Content | None:
 
 
 def _names(about: dict[str, Any]) -> dict[str, Any]:
-    return {name: (_pairs(of[0]), _pairs(of[1]), int(of[2])) for name, of in about["columns"].items()}
+    return {name: (_pairs(entry[0]), _pairs(entry[1]), int(entry[2])) for name, entry in about["columns"].items()}
 
 
 def _pairs(listed: Sequence[Sequence[Any]]) -> tuple[tuple[str, int], ...]:

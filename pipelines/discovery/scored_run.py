@@ -21,7 +21,7 @@ LOGGER = logging.getLogger("tumbleline.discovery")
 
 @dataclass(frozen=True)
 class ScoredRun:
-    """What is kept of a run.
+    """The scores of a run, as they are stored.
 
     left_out : why it is not pooled; empty where it is · columns : of the sensor, then of the station
     score, own : (units, m·k); information : (m·k,) · station : (2, q), scores and information
@@ -61,11 +61,11 @@ def scored_runs(part: tuple[str, Sequence[str]]) -> list[ScoredRun]:
     (address, ids), out = part, list[ScoredRun]()
     archive = Archive(address)
     with threadpool_limits(1):
-        for one in ids:
+        for run_id in ids:
             try:
-                out.append(_scored(Run(archive, one)))
+                out.append(_scored(Run(archive, run_id)))
             except ArchiveUnusable as problem:
-                LOGGER.warning("discover: run %s is not pooled: %s", one, problem)
+                LOGGER.warning("discover: run %s is not pooled: %s", run_id, problem)
     return out
 
 
@@ -97,8 +97,8 @@ def _scored(run: Run) -> ScoredRun:
         if len(lot.state.axes) < 3:
             return ScoredRun(**head, left_out="its devices have fewer than three axes")
         faulty = {fault.unit for fault in faults}
-        units = tuple(one for place, one in enumerate(measurement.units) if place not in faulty)
-        return _kept(head, units, slots, scores_of(lot, effects))
+        units = tuple(unit for row, unit in enumerate(measurement.units) if row not in faulty)
+        return _scored_lot(head, units, slots, scores_of(lot, effects))
     except (InertialError, DataRejected, RecipeInvalid) as problem:
         return ScoredRun(**head, left_out=str(problem).rstrip("."))
 
@@ -116,7 +116,7 @@ def _reason(run: Run, effects: Sequence[str]) -> str:
     return ""
 
 
-def _kept(head: dict[str, Any], units: tuple[str, ...], slots: dict[str, str], scores: LotScores) -> ScoredRun:
+def _scored_lot(head: dict[str, Any], units: tuple[str, ...], slots: dict[str, str], scores: LotScores) -> ScoredRun:
     count = len(units)
     return ScoredRun(
         **head,

@@ -9,7 +9,7 @@ from pathlib import Path
 from pipelines.archive import Archive, files
 from pipelines.archive.archive import FORMAT
 from pipelines.archive.signatures import VARIABLE as KEY_VARIABLE
-from pipelines.archive.signatures import key_place, name_of, private_key
+from pipelines.archive.signatures import key_file, name_of, private_key
 from pipelines.archive.store import first_line
 from pipelines.doctor.check import LARGEST_OFFSET_S, clock_check, judged, of_error, unwritable, write_probe
 from pipelines.doctor.documents import Check
@@ -87,29 +87,29 @@ def _later_than_now(root: Path) -> list[Check]:
 def key_checks(address: str | None) -> list[Check]:
     """The checks of the key that signs manifests and certificates."""
     try:
-        place = key_place()
-        if place is None:
+        path = key_file()
+        if path is None:
             remedy = f"make one with 'tumbleline archive key', and name its file in {KEY_VARIABLE}"
             return [Check(KEY, "present", "warning", "none: manifests are not signed", "an Ed25519 key", remedy)]
-        name = name_of(private_key(place).public_key())
+        name = name_of(private_key(path).public_key())
     except TumblelineError as problem:
         return [of_error(KEY, "present", problem)]
-    mode = stat.S_IMODE(place.stat().st_mode)
+    mode = stat.S_IMODE(path.stat().st_mode)
     private = not mode & OTHERS
     return [
-        Check(KEY, "present", "good", f"{name} in {place}"),
-        judged(KEY, "private", f"mode {mode:04o}", "0600 or less", f"run: chmod 600 {place}", good=private),
-        _outside(place, address),
+        Check(KEY, "present", "good", f"{name} in {path}"),
+        judged(KEY, "private", f"mode {mode:04o}", "0600 or less", f"run: chmod 600 {path}", good=private),
+        _outside(path, address),
     ]
 
 
-def _outside(place: Path, address: str | None) -> Check:
+def _outside(path: Path, address: str | None) -> Check:
     try:
         root = Archive(address).root
     except TumblelineError:
         return Check(KEY, "outside the archive", "not configured", "the archive cannot be reached")
-    inside = isinstance(root, Path) and place.resolve().is_relative_to(root.resolve())
+    inside = isinstance(root, Path) and path.resolve().is_relative_to(root.resolve())
     found, remedy = "yes", "move it elsewhere: who can change the archive could sign with it"
     if inside:
-        found = f"{place} lies in the archive"
+        found = f"{path} lies in the archive"
     return judged(KEY, "outside the archive", found, "a place outside", remedy, good=not inside)

@@ -68,9 +68,9 @@ def clock_check(part: str, ahead_s: float, whose: str) -> Check:
     return judged(part, "clock", found, needed, remedy, good=abs(ahead_s) <= LARGEST_OFFSET_S)
 
 
-def unwritable(part: str, place: object, problem: OSError, remedy: str) -> Check:
+def unwritable(part: str, folder: object, problem: OSError, remedy: str) -> Check:
     """A fault of a folder that takes no file."""
-    found = f"{place} cannot be written ({first_line(problem)})"
+    found = f"{folder} cannot be written ({first_line(problem)})"
     return Check(part, "writable", "fault", found, "write permission and free space", remedy)
 
 

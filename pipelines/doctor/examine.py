@@ -81,7 +81,7 @@ def _zone() -> Check:
 
 
 def _synchronised() -> Check:
-    """What the kernel says of its clock, whichever program disciplines it."""
+    """The state of the clock by the kernel, whichever program disciplines it."""
     state = clock_state()
     if state is None:
         return Check(CLOCK, "synchronised", "not configured", "this system does not say", "", "check its time server")
@@ -92,7 +92,7 @@ def _synchronised() -> Check:
 
 
 def clock_state() -> int | None:
-    """What adjtimex(2) returns when nothing is set; None where there is no such call or it is not allowed."""
+    """The result of adjtimex(2) that sets nothing; None where the call does not exist or is not allowed."""
     if not sys.platform.startswith("linux"):
         return None
     try:

@@ -25,7 +25,7 @@ LARGEST_BODY = 65536
 
 
 class ServerAnswer(NamedTuple):
-    """What a server answered; ``ahead_s``: of its clock against the host's, None where it states no time."""
+    """The answer of a server; ``ahead_s``: its clock less that of the host, None where it states no time."""
 
     status: int
     body: str
@@ -106,15 +106,15 @@ def _authenticated(address: str) -> list[Check]:
 
 
 def _version(body: str) -> Check:
-    own = metadata.version("prefect")
+    installed = metadata.version("prefect")
     try:
         found = str(json.loads(body))
     except ValueError:
         found = "no version"
-    if found == own:
+    if found == installed:
         return Check(PART, "version", "good", found)
     remedy = "install one version of Prefect on the server and here"
-    return Check(PART, "version", "warning", f"the server has {found}", f"{own}, as here", remedy)
+    return Check(PART, "version", "warning", f"the server has {found}", f"{installed}, as here", remedy)
 
 
 def _in_clear(address: str) -> list[Check]:

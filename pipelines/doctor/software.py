@@ -31,7 +31,7 @@ def _python() -> Check:
     if version not in SpecifierSet(needed, prereleases=True):
         return Check(PART, "Python", "fault", version, needed, "install the product in an environment of that version")
     classes = metadata.metadata(PRODUCT).get_all("Classifier") or ()  # the versions that the tests have run on
-    tested = [one.rpartition(" :: ")[2] for one in classes if one.startswith("Programming Language :: Python :: 3.")]
+    tested = [name.rpartition(" :: ")[2] for name in classes if name.startswith("Programming Language :: Python :: 3.")]
     if version.rpartition(".")[0] not in tested:
         remedy = "install the product in an environment of one of these where it is validated"
         needed = f"{', '.join(tested)}, which the tests run on"
@@ -87,8 +87,8 @@ def _pinned() -> Check:
         if name in held and held[name] != version
     ]
     if not other:
-        same = len(locked.keys() & held.keys())
-        return Check(PART, "lock", "good", f"{same} libraries have the versions of the lock")
+        matching = len(locked.keys() & held.keys())
+        return Check(PART, "lock", "good", f"{matching} libraries have the versions of the lock")
     more = f" and {len(other) - SHOWN} more" if len(other) > SHOWN else ""
     found, needed = f"{'; '.join(other[:SHOWN])}{more}", "the versions of the lock, which were tested together"
     return Check(PART, "lock", "warning", found, needed, f"run: pip install --no-deps --require-hashes -r {path}")
@@ -100,16 +100,16 @@ def _optional() -> Check:
     have: list[str] = []
     lack: list[str] = []
     for extra in sorted(set(metadata.metadata(PRODUCT).get_all("Provides-Extra") or ()) - DEVELOPMENT):
-        own = [
-            one
-            for one in declared
-            if one.marker is not None
-            and not one.marker.evaluate({"extra": ""})
-            and one.marker.evaluate({"extra": extra})
-            and canonicalize_name(one.name) != PRODUCT
+        requirements = [
+            requirement
+            for requirement in declared
+            if requirement.marker is not None
+            and not requirement.marker.evaluate({"extra": ""})
+            and requirement.marker.evaluate({"extra": extra})
+            and canonicalize_name(requirement.name) != PRODUCT
         ]
-        if own:
-            (have if all(_installed(one.name) for one in own) else lack).append(extra)
+        if requirements:
+            (have if all(_installed(requirement.name) for requirement in requirements) else lack).append(extra)
     if not have and not lack:
         remedy = "install the product again, so that its metadata are those of its code"
         return Check(PART, "optional parts", "warning", "the metadata name none", "the extras of this version", remedy)

@@ -173,7 +173,7 @@ def symmetric(values: Array, label: str) -> ColourScale:
 
 def density(x: Array, y: Array) -> Trace:
     """Counts of many points in cells of a grid: for points that would cover each other."""
-    there = np.isfinite(x) & np.isfinite(y)
-    counts, *edges = np.histogram2d(x[there], y[there], bins=(80, 60))
+    finite = np.isfinite(x) & np.isfinite(y)
+    counts, *edges = np.histogram2d(x[finite], y[finite], bins=(80, 60))
     columns, rows = (0.5 * (edge[1:] + edge[:-1]) for edge in edges)
     return Trace("all units", columns, rows, "density", "muted", counts=counts.T)

@@ -57,10 +57,10 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
     if chart.columns == 1 and not spheres and longest <= NARROW_LETTERS:
         return figure
     height = min(chart.height, NARROW_SPHERE_PX) if spheres else chart.height
-    plots = tuple(replace(one, x=replace(one.x, label=fill(one.x.label, NARROW_LETTERS))) for one in chart.plots)
+    plots = tuple(replace(plot, x=replace(plot.x, label=fill(plot.x.label, NARROW_LETTERS))) for plot in chart.plots)
     note = fill(chart.note, NARROW_LETTERS)
     narrow = _layout(replace(chart, plots=plots, columns=1, height=height, note=note), NARROW_NAMES)
-    narrow["height"] += ENTRY_PX * sum(one["showlegend"] for one in data)  # the legend has one entry a line there
+    narrow["height"] += ENTRY_PX * sum(trace["showlegend"] for trace in data)  # the legend has one entry a line there
     return figure | {"narrow": narrow}
 
 
@@ -77,7 +77,7 @@ def _layout(chart: Chart, most_names: int = MOST_NAMES) -> dict[str, Any]:
         "meta": {"title": _safe(chart.title)},
     }
     for number, plot in enumerate(chart.plots):
-        _place(layout, plot, number, chart, most_names)
+        _lay_out(layout, plot, number, chart, most_names)
     if chart.scale is not None:
         layout["coloraxis"] = _colour_axis(chart.scale)
         layout["margin"]["r"] = 78
@@ -100,11 +100,11 @@ def _axis_names(number: int) -> tuple[str, str]:
     return f"x{end}", f"y{end}"
 
 
-def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart, most_names: int) -> None:
+def _lay_out(layout: dict[str, Any], plot: Plot, number: int, chart: Chart, most_names: int) -> None:
     """The axes of a plot at its place in the grid, with its title above."""
     row, column = divmod(number, chart.columns)
     beside, below = (SPHERE_GAP_X, SPHERE_GAP_PX) if plot.sphere else (GAP_X, GAP_PX)
-    below += LABEL_PX * max(one.x.label.count("\n") for one in chart.plots)
+    below += LABEL_PX * max(drawn.x.label.count("\n") for drawn in chart.plots)
     width = (1.0 - beside * (chart.columns - 1)) / chart.columns
     gap = below / (chart.height * chart.rows)
     height = (1.0 - gap * (chart.rows - 1)) / chart.rows
@@ -149,8 +149,8 @@ def _axis(axis: PlotAxis, plot: Plot, side: str, most_names: int) -> dict[str, A
         if days.size and np.ptp(days) < NARROW_D:
             out["range"] = [DAY_MS * (float(days.min()) - NARROW_D), DAY_MS * (float(days.max()) + NARROW_D)]
     if axis.names:
-        every = -(-len(axis.names) // most_names) if side == "x" else 1
-        places = list(range(0, len(axis.names), every))
+        step = -(-len(axis.names) // most_names) if side == "x" else 1
+        places = list(range(0, len(axis.names), step))
         out |= {"tickvals": places, "ticktext": [_safe(shortened(axis.names[k])) for k in places]}
     if axis.step is not None:
         out["dtick"] = axis.step
@@ -178,10 +178,10 @@ def _trace(trace: Trace, names: tuple[str, str], shown: set[str], *, dates: bool
         }  # fmt: skip
     if trace.style == "band":
         # one closed line: up along the low edge, back along the high one
-        back = np.asarray(trace.high)[::-1]
+        upper = np.asarray(trace.high)[::-1]
         return out | {
             "type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": f"{colour}:0.2", "line": {"width": 0},
-            "x": packed(np.concatenate([x, x[::-1]])), "y": packed(np.concatenate([trace.y, back])), "hoverinfo": "skip",
+            "x": packed(np.concatenate([x, x[::-1]])), "y": packed(np.concatenate([trace.y, upper])), "hoverinfo": "skip",
         }  # fmt: skip
     out |= {"x": packed(x, dates=dates), "y": packed(trace.y)}
     if trace.style == "bars":
@@ -216,7 +216,7 @@ def _points(trace: Trace, colour: str) -> dict[str, Any]:
 
 
 def _colour_axis(scale: ColourScale) -> dict[str, Any]:
-    colours = [list(one) for one in (DIVERGING if scale.diverging else SEQUENTIAL)]
+    colours = [list(anchor) for anchor in (DIVERGING if scale.diverging else SEQUENTIAL)]
     title = {"text": _safe(scale.label), "side": "right", "font": {"size": 13}}
     return {
         "cmin": scale.low, "cmax": scale.high, "colorscale": colours,

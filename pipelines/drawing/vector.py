@@ -10,7 +10,7 @@ import numpy as np
 
 from inertial.arrays import Array
 from pipelines.drawing.chart import ROLES, Chart, ColourScale, Plot, PlotAxis, Trace
-from pipelines.drawing.marks import DRAW, Place, marks, shade
+from pipelines.drawing.marks import DRAW, PlotArea, marks, shade
 from pipelines.drawing.ticks import Ticks, date_ticks, linear_ticks, log_ticks
 
 WIDTH = 1150.0
@@ -50,14 +50,14 @@ def svg_text(chart: Chart) -> str:
     lines = _legend_lines(names)
     head = max(HEAD, LINE * len(lines) + 6.0)
     wide = WIDTH - (BAR if chart.scale is not None else 0.0)
-    each = (wide - GAP * (chart.columns - 1)) / chart.columns
-    scaled = [_scaled(plot, each, float(chart.height)) for plot in chart.plots]
+    plot_width = (wide - GAP * (chart.columns - 1)) / chart.columns
+    scaled = [_scaled(plot, plot_width, float(chart.height)) for plot in chart.plots]
     left = [
         max((_left(chart, k, scaled[k][1]) for k in range(column, len(chart.plots), chart.columns)), default=0.0)
         for column in range(chart.columns)
     ]
     feet = [
-        0.0 if plot.sphere else _foot(scaled[k][0].ticks, each - left[k % chart.columns] - 6.0)
+        0.0 if plot.sphere else _foot(scaled[k][0].ticks, plot_width - left[k % chart.columns] - 6.0)
         for k, plot in enumerate(chart.plots)
     ]
     tall = chart.height + max(feet, default=0.0)
@@ -68,15 +68,15 @@ def svg_text(chart: Chart) -> str:
     ]
     for number, plot in enumerate(chart.plots):
         row, column = divmod(number, chart.columns)
-        x, y = column * (each + GAP), head + row * tall
+        x, y = column * (plot_width + GAP), head + row * tall
         if plot.sphere:
-            place = _sphere_place(plot, x, y, each, tall)
+            area = _sphere_area(plot, x, y, plot_width, tall)
         else:
-            wide_each, tall_each = each - left[column] - 6.0, tall - TOP - BOTTOM - feet[number]
-            place = Place(x + left[column], y + TOP, wide_each, tall_each, *(one.at for one in scaled[number]))
-            parts.append(_axes(plot, place, scaled[number], feet[number], labelled=_labelled(chart, number)))
-        parts += [DRAW[trace.style](trace, place, chart.scale) for trace in plot.traces]
-        parts.append(text_at(place.left, y + TOP - 9.0, plot.title, 'font-weight="600"') if plot.title else "")
+            wide_each, tall_each = plot_width - left[column] - 6.0, tall - TOP - BOTTOM - feet[number]
+            area = PlotArea(x + left[column], y + TOP, wide_each, tall_each, *(axis.at for axis in scaled[number]))
+            parts.append(_axes(plot, area, scaled[number], feet[number], labelled=_labelled(chart, number)))
+        parts += [DRAW[trace.style](trace, area, chart.scale) for trace in plot.traces]
+        parts.append(text_at(area.left, y + TOP - 9.0, plot.title, 'font-weight="600"') if plot.title else "")
     height = head + tall * chart.rows
     if chart.note:
         height += LINE
@@ -121,8 +121,8 @@ def _axis(axis: PlotAxis, arrays: list[Array], most: int) -> _Scaled:
     if axis.low is not None and axis.high is not None:
         low, high = (float(np.log10(axis.low)), float(np.log10(axis.high))) if axis.log else (axis.low, axis.high)
     if axis.names:
-        every = 1 + len(axis.names) // max(MOST_NAMES, 3 * most)
-        ticks = [(float(k), axis.names[k]) for k in range(0, len(axis.names), every) if low <= k <= high]
+        step = 1 + len(axis.names) // max(MOST_NAMES, 3 * most)
+        ticks = [(float(k), axis.names[k]) for k in range(0, len(axis.names), step) if low <= k <= high]
     elif axis.log:
         ticks = log_ticks(10.0**low, 10.0**high)
     elif axis.dates:
@@ -152,15 +152,15 @@ def _foot(ticks: Ticks, wide: float) -> float:
     return SINE * LETTER * min(max(map(len, texts)), LONGEST_TURNED) - 4.0
 
 
-def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], foot: float, *, labelled: bool) -> str:
+def _axes(plot: Plot, area: PlotArea, scaled: tuple[_Scaled, _Scaled], foot: float, *, labelled: bool) -> str:
     """Grid, ticks, labels and the lines of the two axes."""
     across, along = scaled
-    base = place.top + place.height
-    x_ticks = [(float(place.x(np.array([value]))[0]), text) for value, text in across.ticks]
-    y_ticks = [(float(place.y(np.array([value]))[0]), text) for value, text in along.ticks]
-    grid = "".join(f"M{x:.1f} {place.top:.1f}v{place.height:.1f}" for x, _ in x_ticks)
-    grid += "".join(f"M{place.left:.1f} {y:.1f}h{place.width:.1f}" for y, _ in y_ticks)
-    frame = f"M{place.left:.1f} {place.top:.1f}v{place.height:.1f}h{place.width:.1f}"
+    base = area.top + area.height
+    x_ticks = [(float(area.x(np.array([value]))[0]), text) for value, text in across.ticks]
+    y_ticks = [(float(area.y(np.array([value]))[0]), text) for value, text in along.ticks]
+    grid = "".join(f"M{x:.1f} {area.top:.1f}v{area.height:.1f}" for x, _ in x_ticks)
+    grid += "".join(f"M{area.left:.1f} {y:.1f}h{area.width:.1f}" for y, _ in y_ticks)
+    frame = f"M{area.left:.1f} {area.top:.1f}v{area.height:.1f}h{area.width:.1f}"
     parts = [f'<path d="{grid}" stroke="{GRID}" fill="none"/><path d="{frame}" stroke="{FRAME}" fill="none"/>']
     turned = foot > 0.0
     for x, text in x_ticks:
@@ -169,12 +169,12 @@ def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], foot: float
         )
         at = x if turned else min(x, WIDTH - 0.5 * LETTER * len(text))  # the last one ends inside
         parts.append(text_at(at, base + 15.0, _cut(text) if turned else text, f'{turn} fill="{QUIET}"'))
-    parts += [text_at(place.left - 6.0, y + 4.0, text, f'text-anchor="end" fill="{QUIET}"') for y, text in y_ticks]
-    middle, below = place.left + 0.5 * place.width, base + 34.0 + foot
+    parts += [text_at(area.left - 6.0, y + 4.0, text, f'text-anchor="end" fill="{QUIET}"') for y, text in y_ticks]
+    middle, below = area.left + 0.5 * area.width, base + 34.0 + foot
     parts.append(text_at(middle, below, plot.x.label, 'text-anchor="middle"'))
     if labelled and plot.y.label:
-        x = place.left - LETTER * max((len(text) for _, text in y_ticks), default=0) - 19.0
-        y = place.top + 0.5 * place.height
+        x = area.left - LETTER * max((len(text) for _, text in y_ticks), default=0) - 19.0
+        y = area.top + 0.5 * area.height
         parts.append(text_at(x, y, plot.y.label, f'text-anchor="middle" transform="rotate(-90 {x:.1f} {y:.1f})"'))
     return "".join(parts)
 
@@ -183,13 +183,13 @@ def _cut(text: str) -> str:
     return text if len(text) <= LONGEST_TURNED else f"{text[: LONGEST_TURNED - 1]}…"
 
 
-def _sphere_place(plot: Plot, x: float, y: float, wide: float, tall: float) -> Place:
+def _sphere_area(plot: Plot, x: float, y: float, wide: float, tall: float) -> PlotArea:
     """The place of a map, with the same scale in both directions."""
     low, high = plot.x.low or -2.12, plot.x.high or 2.12
     bottom, top = plot.y.low or -1.16, plot.y.high or 1.16
     scale = min(wide / (high - low), (tall - SPHERE_TOP) / (top - bottom))
     width, height = scale * (high - low), scale * (top - bottom)
-    return Place(
+    return PlotArea(
         x + 0.5 * (wide - width), y + SPHERE_TOP, width, height,
         lambda values: (values - low) / (high - low), lambda values: (values - bottom) / (top - bottom),
     )  # fmt: skip
@@ -206,7 +206,7 @@ def _legend_names(chart: Chart) -> list[tuple[str, str]]:
 
 
 def _mark(trace: Trace) -> str:
-    """What a trace looks like, about the origin."""
+    """The symbol of a trace for the legend, about the origin, as SVG."""
     colour = ROLES[trace.role]
     if trace.style == "line":
         dash = ' stroke-dasharray="5 3"' if trace.dashed else ""
@@ -237,9 +237,9 @@ def _bar(scale: ColourScale, x: float, y: float, height: float) -> str:
     steps = 48
     share = (np.arange(steps) + 0.5) / steps
     colours = shade(scale.low + share * (scale.high - scale.low), scale)
-    each = height / steps
+    step_height = height / steps
     cells = "".join(
-        f'<path d="M{x:.1f} {y + height - each * (k + 1):.2f}h12v{each + 0.4:.2f}h-12z" fill="{colour}"/>'
+        f'<path d="M{x:.1f} {y + height - step_height * (k + 1):.2f}h12v{step_height + 0.4:.2f}h-12z" fill="{colour}"/>'
         for k, colour in enumerate(colours)
     )
     labels = "".join(

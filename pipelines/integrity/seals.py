@@ -66,7 +66,7 @@ def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = N
         if content.get("number") != number:
             checked.wrong(EDITED, place, f"says that it is entry {content.get('number')!r}")
         if before and content.get("previous") != before:
-            earlier = hash_chain.place_of_entry(root, number - 1)
+            earlier = hash_chain.path_of_entry(root, number - 1)
             checked.wrong(EDITED, earlier, f"is not the entry that number {number} refers to")
         named = checked.named(content, "files", place)
         # names that lead out of the archive are ignored
@@ -134,7 +134,7 @@ def _fault_of_seal(run: Run, content: dict[str, Any], chain: Chain, checked: Ver
     if not isinstance(number, int) or number < 1:
         return f"names entry {number!r} of the chain, a number is needed; restore it from a copy"
     if number not in chain.entries:
-        entry = hash_chain.place_of_entry(run.archive.root, number)
+        entry = hash_chain.path_of_entry(run.archive.root, number)
         checked.wrong(MISSING, entry, f"is missing, it sealed run {run.id}")
         return ""
     if f"runs/{run.id}/run.json" not in checked.named(content, "files", mark):

@@ -8,7 +8,7 @@ from long_suites import mostly_slow
 from inertial.population.change_points import change_points
 from inertial.population.control_charts import alarms, baseline, false_alarms, signals
 from pipelines.audit.calibrations import Calibrations
-from pipelines.audit.drifts import OWN, kind_drifts
+from pipelines.audit.drifts import OF_UNIT, kind_drifts
 from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.population import Figures, abilities, odd_ones
@@ -122,7 +122,7 @@ def test_units_are_in_tolerance_when_their_reliability_ends(rng, slope, walk, ti
     ahead = (np.array([last[f"U{u:05d}"] for u in range(units)]) - days[-1]) / YEAR_D
     walked = walk * np.sqrt(ahead)[:, None] * rng.standard_normal((units, len(NAMES)))
     then = level[:, -1] + slopes[:, 0] * ahead[:, None] + walked
-    off = np.abs(then - values[:, -1] / TOLERANCE)[:, [NAMES.index(name) for name in OWN]]
+    off = np.abs(then - values[:, -1] / TOLERANCE)[:, [NAMES.index(name) for name in OF_UNIT]]
     assert np.mean(np.all(off <= 1.0, axis=1)) > 0.92
     assert np.median(ahead) > 0.5
 
@@ -138,7 +138,7 @@ def test_units_that_stand_still_agree_in_nineteen_of_twenty(rng, stated):
         serials = named(units, times)
         histories = calibrations(serials, days, values, errors=stated * REPEAT)
         beyond += disagreeing(histories)
-    assert len(beyond) == 8 * len(OWN)
+    assert len(beyond) == 8 * len(OF_UNIT)
     assert np.mean(beyond) < 0.062
 
 
@@ -161,7 +161,7 @@ def test_second_calibrations_agree_in_nineteen_of_twenty(rng, kind, units):
         values = (REPEAT * pair).reshape(-1, len(NAMES))
         histories = calibrations(serials, days.ravel(), values, errors=0.2 * REPEAT)
         beyond += disagreeing(histories)
-    assert len(beyond) == 6 * len(OWN)
+    assert len(beyond) == 6 * len(OF_UNIT)
     assert np.mean(beyond) < 0.065
 
 

@@ -17,7 +17,7 @@ from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.signature_check import CertificateFacts, canonical, first, parsed, statements
 from schemas.errors import ArchiveUnusable, TumblelineError
 
-SHOWN = 3  # different places that are named
+SHOWN = 3  # differences that are named
 LONGEST = 90  # of a text that is shown
 SPACE = "space between elements"
 NONE = ("", "", "")
@@ -25,7 +25,7 @@ NONE = ("", "", "")
 
 @dataclass(frozen=True)
 class Compared:
-    """What the archive says of a certificate.
+    """The comparison of a certificate with the archive.
 
     known : whether the ledger has its number; ended : why it is not valid any more, empty where it is
     until : until when it is valid and what comes then, where that is known already
@@ -44,7 +44,7 @@ class Compared:
 
 
 def compare(root: Any, facts: CertificateFacts, archive: Archive, who: LaboratoryFile | None = None) -> Compared:
-    """What the archive says of a certificate.
+    """The comparison of a certificate with the archive.
 
     Parameters
     ----------
@@ -52,47 +52,47 @@ def compare(root: Any, facts: CertificateFacts, archive: Archive, who: Laborator
     who : the laboratory's file; where None its texts are taken from the document and told as not proven
     """
     known = Ledger(archive).calibrations(facts.serial) if facts.serial else []
-    own = next((one for one in known if one.certificate == facts.number), None)
-    if own is None:
+    calibration = next((entry for entry in known if entry.certificate == facts.number), None)
+    if calibration is None:
         return Compared(known=False)
     try:
-        made = _made_again(root, Run(archive, own.run), own, known, who)
+        made = _made_again(root, Run(archive, calibration.run), calibration, known, who)
     except ValidationError as problem:
         text = f"{'.'.join(map(str, problem.errors()[0]['loc']))}: {problem.errors()[0]['msg']}".removeprefix(": ")
-        return Compared(True, *_ended(own), (f"what the file says of the laboratory is not allowed: {text}",))
+        return Compared(True, *_ended(calibration), (f"what the file says of the laboratory is not allowed: {text}",))
     except ArchiveUnusable as problem:
-        return Compared(True, *_ended(own), (*_other_entry(facts, own), str(problem)))
+        return Compared(True, *_ended(calibration), (*_other_entry(facts, calibration), str(problem)))
     except TumblelineError as problem:
-        return Compared(True, *_ended(own), _other_entry(facts, own), reason=str(problem))
+        return Compared(True, *_ended(calibration), _other_entry(facts, calibration), reason=str(problem))
     # comments and instructions before the root element count as well
-    here, there = root.getroottree(), [parsed(dcc(content)).getroottree() for content in made]
-    if any(canonical(here) == canonical(one) for one in there):
+    found, expected = root.getroottree(), [parsed(dcc(content)).getroottree() for content in made]
+    if any(canonical(found) == canonical(document) for document in expected):
         unproven = "" if who is not None else said_by(made[0].who)
-        return Compared(True, *_ended(own), count=len(list(_places(root))), unproven=unproven)
-    return Compared(True, *_ended(own), tuple(_different(root, there[0].getroot())))
+        return Compared(True, *_ended(calibration), count=len(list(_nodes(root))), unproven=unproven)
+    return Compared(True, *_ended(calibration), tuple(_different(root, expected[0].getroot())))
 
 
 def _made_again(
-    root: Any, run: Run, own: Calibration, known: list[Calibration], who: LaboratoryFile | None
+    root: Any, run: Run, calibration: Calibration, known: list[Calibration], who: LaboratoryFile | None
 ) -> list[CertificateContent]:
-    """The document of the day of issue, and, where another has replaced the certificate since, the one that names that."""
-    first = compose(run, replace(own, ended_by=None), known, who or NOBODY)
+    """The document of the day of issue, and, where the certificate was replaced since, the document that names its successor."""
+    first = compose(run, replace(calibration, ended_by=None), known, who or NOBODY)
     if who is None:
-        said = laboratory_in(root, first)
-        method = f"{said.method.procedure}. {first.method}" if said.method.procedure else first.method
-        first = first.model_copy(update={"who": said, "method": method})
-    if own.ended_by is None or own.ended_by.action == "revoke":
+        laboratory = laboratory_in(root, first)
+        method = f"{laboratory.method.procedure}. {first.method}" if laboratory.method.procedure else first.method
+        first = first.model_copy(update={"who": laboratory, "method": method})
+    if calibration.ended_by is None or calibration.ended_by.action == "revoke":
         return [first]
-    named = first.amendment.model_copy(update={"replaced_by": own.ended_by.certificate})
+    named = first.amendment.model_copy(update={"replaced_by": calibration.ended_by.certificate})
     return [first, first.model_copy(update={"amendment": named})]
 
 
-def _other_entry(facts: CertificateFacts, own: Calibration) -> tuple[str, ...]:
-    """What of a document differs from its entry in the ledger, where the document cannot be made again."""
+def _other_entry(facts: CertificateFacts, calibration: Calibration) -> tuple[str, ...]:
+    """Differences of a document from its entry in the ledger, where the document cannot be made again."""
     entries = (
-        ("run", facts.run, own.run),
-        ("SHA-256 of the coefficients", facts.coefficients, own.event.coefficients),
-        ("date of issue", facts.issued, own.event.when[:10]),
+        ("run", facts.run, calibration.run),
+        ("SHA-256 of the coefficients", facts.coefficients, calibration.event.coefficients),
+        ("date of issue", facts.issued, calibration.event.when[:10]),
     )
     return tuple(
         f"{what}: the file says {found or 'nothing'}, the ledger {needed}"
@@ -101,48 +101,48 @@ def _other_entry(facts: CertificateFacts, own: Calibration) -> tuple[str, ...]:
     )
 
 
-def _different(here: Any, there: Any) -> list[str]:
-    """The first places at which two documents differ, and how many there are."""
-    pairs = [(a, b) for a, b in zip_longest(_places(here), _places(there)) if (a or NONE)[:2] != (b or NONE)[:2]]
+def _different(found: Any, expected: Any) -> list[str]:
+    """The first differences of two documents, and the number of the others."""
+    pairs = [(a, b) for a, b in zip_longest(_nodes(found), _nodes(expected)) if (a or NONE)[:2] != (b or NONE)[:2]]
     if not pairs:
         return ["the file differs from the document of the archive in what stands around its root element"]
-    pairs = [pair for pair in pairs if SPACE not in {one[0] for one in pair if one}] or pairs
+    pairs = [pair for pair in pairs if SPACE not in {item[0] for item in pair if item}] or pairs
     lines = [_line(a or NONE, b or NONE) for a, b in pairs[:SHOWN]]
     return [*lines, f"and {len(pairs) - SHOWN} other places"] if len(pairs) > SHOWN else lines
 
 
-def _line(here: tuple[str, str, str], there: tuple[str, str, str]) -> str:
-    if here[0] == there[0]:
-        equal = takewhile(lambda pair: pair[0] == pair[1], zip(here[1], there[1], strict=False))
-        same = len(list(equal)) if len(here[1]) > LONGEST else 0
-        return f"{there[2]}: the file says {_short(here[1], same)}, the archive {_short(there[1], same)}"
+def _line(found: tuple[str, str, str], expected: tuple[str, str, str]) -> str:
+    if found[0] == expected[0]:
+        equal = takewhile(lambda pair: pair[0] == pair[1], zip(found[1], expected[1], strict=False))
+        common = len(list(equal)) if len(found[1]) > LONGEST else 0
+        return f"{expected[2]}: the file says {_short(found[1], common)}, the archive {_short(expected[1], common)}"
     return (
-        f"{here[2] or 'end of the document'}: the file says {_short(here[1])}, the archive has "
-        f"{there[2] or 'nothing'} {_short(there[1])} in its place"
+        f"{found[2] or 'end of the document'}: the file says {_short(found[1])}, the archive has "
+        f"{expected[2] or 'nothing'} {_short(expected[1])} in its place"
     )
 
 
-def _short(text: str, same: int = 0) -> str:
+def _short(text: str, common: int = 0) -> str:
     """A text from shortly before its first difference on."""
-    own = " ".join(f"{'…' if same > 20 else ''}{text[max(0, same - 20) :]}".split())
-    return f"'{own[:LONGEST]}{'…' if len(own) > LONGEST else ''}'" if own else "nothing"
+    excerpt = " ".join(f"{'…' if common > 20 else ''}{text[max(0, common - 20) :]}".split())
+    return f"'{excerpt[:LONGEST]}{'…' if len(excerpt) > LONGEST else ''}'" if excerpt else "nothing"
 
 
-def _places(root: Any) -> Iterator[tuple[str, str, str]]:
-    """Every element, attribute and text of a document in order: what it is, its text, and the place that people know."""
-    for one in root.iter():
-        if not isinstance(one.tag, str):
-            yield "comment or instruction", str(one.text), "comment or instruction"
+def _nodes(root: Any) -> Iterator[tuple[str, str, str]]:
+    """Every element, attribute and text of a document in order: tag, text, and a label that a reader knows."""
+    for element in root.iter():
+        if not isinstance(element.tag, str):
+            yield "comment or instruction", str(element.text), "comment or instruction"
         else:
-            place = _named(one)
-            yield one.tag, one.text or "", place
-            for name, value in sorted(one.attrib.items()):
-                yield f"{one.tag} {name}", value, f"{place}, attribute {name}"
-        yield SPACE, one.tail or "", SPACE
+            label = _named(element)
+            yield element.tag, element.text or "", label
+            for name, value in sorted(element.attrib.items()):
+                yield f"{element.tag} {name}", value, f"{label}, attribute {name}"
+        yield SPACE, element.tail or "", SPACE
 
 
 def _named(element: Any) -> str:
-    """The path of an element below the nearest one that has a name, such as a result."""
+    """The path of an element below the nearest element that has a name, such as a result."""
     path: list[str] = []
     while element is not None:
         head = next((child.findtext("{*}content") for child in element.findall("{*}name")), None)
@@ -189,7 +189,7 @@ STATED = {
         "condition": f"{ITEM}/dcc:description/dcc:content",
     },
 }
-"""Where the administrative data of a document have the keys of the laboratory's file."""
+"""Paths in the administrative data of a document, by the keys of the laboratory's file."""
 ACCREDITED, DEVIATIONS = "Accreditation: ", "Deviations from the method: "
 
 NOBODY = LaboratoryFile.model_validate(
@@ -221,10 +221,10 @@ def laboratory_in(root: Any, archived: CertificateContent) -> LaboratoryFile:
     def administrative(path: str) -> str:
         return first(root, f"/*/dcc:administrativeData/{path}/text()")
 
-    said: dict[str, dict[str, Any]] = {
-        table: {key: administrative(path) for key, path in own.items()} for table, own in STATED.items()
+    stated: dict[str, dict[str, Any]] = {
+        table: {key: administrative(path) for key, path in paths.items()} for table, paths in STATED.items()
     }
-    said["item"]["received"] = said["item"]["received"] or None
+    stated["item"]["received"] = stated["item"]["received"] or None
     known = set(statements_of(archived))
     other = [text for text in statements(root) if text not in known]
     claim, deviations = (
@@ -233,15 +233,15 @@ def laboratory_in(root: Any, archived: CertificateContent) -> LaboratoryFile:
     )
     number = administrative(f"{LABORATORY}/dcc:calibrationLaboratoryCode")
     if claim or number:
-        said["laboratory"]["accreditation"] = {"body": claim.removesuffix(f", {number}"), "number": number}
+        stated["laboratory"]["accreditation"] = {"body": claim.removesuffix(f", {number}"), "number": number}
     used = "/*/dcc:measurementResults/dcc:measurementResult/dcc:usedMethods/dcc:usedMethod"
     method = first(root, f"{used}/dcc:description/dcc:content/text()")
-    said["method"] = {
+    stated["method"] = {
         "procedure": method.removesuffix(archived.method).removesuffix(". "),
         "deviations": deviations,
         "remarks": next((text for text in other if not text.startswith((ACCREDITED, DEVIATIONS))), ""),
     }
-    return LaboratoryFile.model_validate(said)
+    return LaboratoryFile.model_validate(stated)
 
 
 def said_by(who: LaboratoryFile) -> str:
@@ -252,4 +252,4 @@ def said_by(who: LaboratoryFile) -> str:
 
 def _values(table: dict[str, Any]) -> list[str]:
     values = [_values(value) if isinstance(value, dict) else [str(value)] for value in table.values() if value]
-    return [text for own in values for text in own]
+    return [text for texts in values for text in texts]

@@ -18,7 +18,7 @@ from schemas.units import MICRO
 
 
 def adjustment(run: Run, calibration: Calibration, known: list[Calibration]) -> Adjustment:
-    """What the earlier calibration of a unit makes of the readings of this one, in the error of the norm of gravity.
+    """Error of the norm of gravity of the readings of a calibration, with the coefficients as found and as left.
 
     The norm needs no angle: a unit that sits otherwise in the fixture than before has no error by that.
 
@@ -28,11 +28,11 @@ def adjustment(run: Run, calibration: Calibration, known: list[Calibration]) -> 
         the same certificate says the same whenever it is written.
     """
     before = [
-        one
-        for one in known
-        if one.event.sequence < calibration.event.sequence
-        and one.run != run.id
-        and not (one.state == "revoked" and one.ended_by and one.ended_by.sequence < calibration.event.sequence)
+        other
+        for other in known
+        if other.event.sequence < calibration.event.sequence
+        and other.run != run.id
+        and not (other.state == "revoked" and other.ended_by and other.ended_by.sequence < calibration.event.sequence)
     ]
     if not before:
         return Adjustment(earlier="", earlier_date="", text="no earlier calibration of this unit is in the archive")
@@ -63,9 +63,9 @@ def _errors(run: Run, source: Run, unit: str) -> Array:
     """| |a| − g | of a run's dwells, (n,), µg, with the coefficients of another run; verification dwells where there are any."""
     dwells, coefficients, covariance = run.table("dwells"), source.table("coefficients"), source.table("covariance")
     history = run.table("history") if "history" in run.tables() else None
-    own = dwells[dwells["unit"] == unit]
+    rows = dwells[dwells["unit"] == unit]
     past = None if history is None else history[history["unit"] == unit]
-    lot = lot_arrays(own, past)
+    lot = lot_arrays(rows, past)
     calibration = read_calibration(*(table[table["unit"] == unit] for table in (coefficients, covariance)))
     corrected = correct(
         calibration.effects, lot.state, lot.output, calibration.coefficients, carried_over(calibration.nonlinear)

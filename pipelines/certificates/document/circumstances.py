@@ -1,4 +1,4 @@
-"""What a certificate says of the circumstances of a calibration: standards, traceability, method, conditions, omissions."""
+"""Texts of a certificate on the circumstances: standards, traceability, method, conditions, omissions."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -48,7 +48,7 @@ def standard_of(reference: Reference) -> content.ReferenceStandard:
 
 
 def entries_of(run: Run, covers: str) -> dict[str, bool]:
-    """What the results rest on in [uncertainty], and whether it names a standard; of several bands all must."""
+    """The entries of [uncertainty] that the results rest on, and whether each names a standard; of several bands all must."""
     terms = Uncertainty.model_validate(run.manifest("budget")["parameters"].get("uncertainty") or {})
     named: dict[str, bool] = {}
     roles = {STATIC if kind == STATIC else PROCEDURES[kind].roles[0] for kind in covers.split()}
@@ -61,7 +61,7 @@ def entries_of(run: Run, covers: str) -> dict[str, bool]:
 
 
 def traceability(budget: StatedBudget, entries: dict[str, bool]) -> str:
-    """What is traceable and what is not: an entry of the budget that names no standard is said to rest on its source."""
+    """Statement of traceability; entries of the budget without a standard are listed with their source."""
     source = budget.grade_source.replace("_", " ")
     if not budget.references:
         return (
@@ -112,8 +112,8 @@ def _static_method(run: Run, recipe: dict[str, Any], lengths: str) -> str:
     """The static calibration; ``lengths``: of its dwells, s, where the run may have chosen them."""
     dwells = run.table("dwells")
     kinds = dwells["kind"].astype(str)
-    poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
-    verified = f"; verification in {kept} other poses" if kept else "; no pose was kept for verification"
+    poses, checks = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
+    verified = f"; verification in {checks} other poses" if checks else "; no pose was kept for verification"
     planned = len(recipe.get("temperatures_C") or [0])
     soaks = number_of(int(dwells["soak"].nunique()) if "soak" in dwells else planned, "temperature")
     return (
@@ -124,7 +124,7 @@ def _static_method(run: Run, recipe: dict[str, Any], lengths: str) -> str:
 
 
 def _of_earlier_calibrations(run: Run, serial: str) -> Iterator[str]:
-    """What earlier calibrations add to those of a unit; nothing without a prior."""
+    """A sentence on the weight of earlier calibrations of the unit; nothing without a prior."""
     table = run.table("prior") if "prior" in run.tables() else None
     prior = None if table is None else prior_document(table[table["unit"] == serial], run.about)
     if prior is not None:
@@ -134,13 +134,13 @@ def _of_earlier_calibrations(run: Run, serial: str) -> Iterator[str]:
 def conditions_of(run: Run, serial: str, recipe: dict[str, Any], *, static: bool) -> list[content.Condition]:
     """Temperatures, supply and gravity of a unit's readings; of a static calibration those of its dwells."""
     table = run.table("dwells" if static else "readings")
-    own, conditions = table[table["unit"] == serial], []
+    rows, conditions = table[table["unit"] == serial], []
     for column, name, unit in (
         ("unit_C", "temperature of the item", "°C"),
         ("chamber_C", "temperature of the chamber", "°C"),
         ("supply_V", "supply voltage", "V"),
     ):
-        values = own[column].dropna() if column in own else []
+        values = rows[column].dropna() if column in rows else []
         if len(values):
             conditions.append(content.Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
     gravity = recipe.get("local_gravity_m_s2") or (run.about.get("mapping") or {}).get("local_gravity_m_s2")

@@ -34,7 +34,7 @@ AMPLITUDES = {"sweep": "g peak", "random_vibration": "g rms", "transverse": "g p
 
 @dataclass
 class ComparedContent:
-    """What the comparisons of a unit add to its certificate.
+    """The parts of a certificate that come from the comparisons of a unit.
 
     budgets : quantities of the tables of the budget whose contributions are printed, with their words
     """
@@ -59,8 +59,8 @@ def compared_content(run: Run, unit: str, sums: Sequence[Row]) -> ComparedConten
     known = {(str(row["quantity"]), str(row["axis"])): row for row in sums}
     for number, rows in comparisons.results(unit).items():
         part = comparisons.parts[number]
-        own = [(row, known[compared_quantity(row), str(row["axis"])]) for row in rows_of(rows)]
-        for row, total in own:
+        pairs = [(row, known[compared_quantity(row), str(row["axis"])]) for row in rows_of(rows)]
+        for row, total in pairs:
             if row["quantity"] in QUANTITIES:
                 made.results.append(_result(row, total))
             if row["quantity"] in BUDGETS:
@@ -68,10 +68,10 @@ def compared_content(run: Run, unit: str, sums: Sequence[Row]) -> ComparedConten
         points = _points(run, unit, number)
         made.methods.append(_method(part, rows, points))
         made.conditions += _conditions(part, points)
-        if any(row["quantity"] == "response_magnitude" for row, _ in own):
-            made.responses.append(_response(part, own, points, _curve(run, unit, number, own)))
+        if any(row["quantity"] == "response_magnitude" for row, _ in pairs):
+            made.responses.append(_response(part, pairs, points, _curve(run, unit, number, pairs)))
             highest = max(
-                (row for row, _ in own if row["quantity"] == "response_magnitude"), key=lambda row: row["setting"]
+                (row for row, _ in pairs if row["quantity"] == "response_magnitude"), key=lambda row: row["setting"]
             )
             made.budgets[compared_quantity(highest)] = _words(highest)
     return made
@@ -90,8 +90,8 @@ def _result(row: Row, total: Row) -> content.Result:
 
 def _points(run: Run, unit: str, number: int) -> pd.DataFrame:
     points = run.table("procedure_points")
-    own = points[(points["unit"] == unit) & (points["number"] == number)]
-    return own[own["series"].isin(["response", "across", "reference"]) & np.isfinite(own["value"])]
+    rows = points[(points["unit"] == unit) & (points["number"] == number)]
+    return rows[rows["series"].isin(["response", "across", "reference"]) & np.isfinite(rows["value"])]
 
 
 def _method(part: Any, rows: pd.DataFrame, points: pd.DataFrame) -> str:
@@ -109,20 +109,20 @@ def _method(part: Any, rows: pd.DataFrame, points: pd.DataFrame) -> str:
 def _conditions(part: Any, points: pd.DataFrame) -> list[content.Condition]:
     """The amplitudes at which a comparison was made."""
     if part.kind == "shock":
-        own = points.loc[points["series"] == "reference", "value"].abs()
+        amplitudes = points.loc[points["series"] == "reference", "value"].abs()
     else:
-        own = points["level_g"].dropna() if "level_g" in points else pd.Series(dtype=float)
-    levels = own.tolist() or [float(part.level_g)]
+        amplitudes = points["level_g"].dropna() if "level_g" in points else pd.Series(dtype=float)
+    levels = amplitudes.tolist() or [float(part.level_g)]
     name = f"amplitude of the {PROCEDURES[part.kind].title.lower()}, {AMPLITUDES.get(part.kind, 'g peak')}"
     return [content.Condition(name=name, low=float(min(levels)), high=float(max(levels)), unit="g")]
 
 
 def _response(
-    part: Any, own: Sequence[tuple[Row, Row]], points: pd.DataFrame, curve: content.Curve | None
+    part: Any, pairs: Sequence[tuple[Row, Row]], points: pd.DataFrame, curve: content.Curve | None
 ) -> content.Response:
     """The transfer function as a table, in the order of frequency."""
     sizes, phases = (
-        {int(row["point"]): (row, total) for row, total in own if row["quantity"] == name}
+        {int(row["point"]): (row, total) for row, total in pairs if row["quantity"] == name}
         for name in ("response_magnitude", "response_phase")
     )
     about = points.set_index("point")
@@ -142,20 +142,20 @@ def _response(
                 phase_k=float(phase["k"]),
             )
         )
-    first = next(row for row, _ in own if row["quantity"] == "response_magnitude")
+    first = next(row for row, _ in pairs if row["quantity"] == "response_magnitude")
     title = f"{PROCEDURES[part.kind].title}, axis {first['axis']}"
     return content.Response(
         title=title, axis=str(first["axis"]), unit=str(first["unit_text"]), points=tuple(rows), curve=curve
     )
 
 
-def _curve(run: Run, unit: str, number: int, own: Sequence[tuple[Row, Row]]) -> content.Curve | None:
+def _curve(run: Run, unit: str, number: int, pairs: Sequence[tuple[Row, Row]]) -> content.Curve | None:
     """The judged model through the points; None where the procedure has none."""
     table = run.table("procedure_curves")
     rows = rows_of(table[(table["unit"] == unit) & (table["number"] == number) & (table["name"] != "")])
     if not rows:
         return None
-    parameters = [_parameter(row, total) for row, total in own if str(row["quantity"]).startswith("curve_")]
+    parameters = [_parameter(row, total) for row, total in pairs if str(row["quantity"]).startswith("curve_")]
     first = rows[0]
     return content.Curve(
         model=str(first["model"]), verdict=str(first["verdict"]), p_value=float(first["p_value"]),

@@ -90,9 +90,9 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
     _refuse(run, calibration)
     budget = stated_budget(run, serial)
     recipe, station = about.get("recipe") or {}, about.get("station") or {}
-    own = [row for row in rows_of(run.table("coefficients")) if row["unit"] == serial]
-    held = [row["name"] for row in own if (row["effect"], row["axis"]) == ("misalignment", EVERY_AXIS)]
-    coefficients = [_coefficient(row) for row in own if row["effect"] != "misalignment" or row["axis"] != EVERY_AXIS]
+    rows = [row for row in rows_of(run.table("coefficients")) if row["unit"] == serial]
+    held = [row["name"] for row in rows if (row["effect"], row["axis"]) == ("misalignment", EVERY_AXIS)]
+    coefficients = [_coefficient(row) for row in rows if row["effect"] != "misalignment" or row["axis"] != EVERY_AXIS]
     first, last = measured_span(run) or (measured_on(run), measured_on(run))
     static = STATIC in event.covers.split()
     compared = compared_content(run, serial, [row for row, _ in budget.quantities])
@@ -157,8 +157,8 @@ def _refuse(run: Run, calibration: Calibration) -> None:
 
 
 def _coefficient(row: Row) -> content.Coefficient:
-    own = {name: row[name] for name in ("effect", "name", "axis", "value", "standard_error")}
-    return content.Coefficient(**own, unit=row["unit_text"])
+    values = {name: row[name] for name in ("effect", "name", "axis", "value", "standard_error")}
+    return content.Coefficient(**values, unit=row["unit_text"])
 
 
 def _quantity(row: Row) -> str:
@@ -202,12 +202,12 @@ def _budget(row: Row, parts: list[Row], words: str) -> content.BudgetTable:
         expanded=None if deviation else row["expanded"],
         rows=tuple(
             content.Contribution(
-                name=LABELS.get(one["contribution"], str(one["contribution"])),
+                name=LABELS.get(contribution["contribution"], str(contribution["contribution"])),
                 unit=row["unit_text"],
-                source=source_words(one["source"]),
-                **{name: one[name] for name in ("type", "distribution", "u", "share")},
+                source=source_words(contribution["source"]),
+                **{name: contribution[name] for name in ("type", "distribution", "u", "share")},
             )
-            for one in sorted(parts, key=lambda part: -part["share"])
+            for contribution in sorted(parts, key=lambda part: -part["share"])
         ),
     )
 
@@ -227,7 +227,7 @@ def _conformity(row: Row, letters: str) -> content.Conformity:
 
 
 def _grade_statement(budget: StatedBudget, grade: str) -> str:
-    """What the grade says of the item: a probability, by the distribution of its largest error."""
+    """Meaning of the grade as a probability, by the distribution of the largest error; empty without a grade."""
     quantiles = {row["axis"]: row["value"] for row, _ in budget.quantities if row["quantity"] == LARGEST_ERROR}
     if not quantiles or grade not in GRADES:
         return ""
@@ -239,11 +239,12 @@ def _grade_statement(budget: StatedBudget, grade: str) -> str:
     )
 
 
-def _amendment(one: Calibration, known: list[Calibration]) -> content.Amendment:
-    """A certificate of the same run that this one ended, or that was revoked before: its amendment; one that ended this one."""
-    earlier = [old for old in known if old.run == one.run and old.event.sequence < one.event.sequence]
-    ended = [old.certificate for old in earlier if old.event.sequence in one.event.ends]
-    alike = [old for old in earlier if one.event.ends_others_of(old.event)][-1:]
-    ended = ended or [old.certificate for old in alike if old.withdrawn and one.event.reason]
-    after = one.ended_by.certificate if one.ended_by is not None and one.ended_by.action != "revoke" else ""
-    return content.Amendment(replaces=tuple(ended), reason=one.event.reason if ended else "", replaced_by=after)
+def _amendment(calibration: Calibration, known: list[Calibration]) -> content.Amendment:
+    """The certificates of the run that a certificate replaces, with the reason, and the certificate that replaces it."""
+    earlier = [old for old in known if old.run == calibration.run and old.event.sequence < calibration.event.sequence]
+    ended = [old.certificate for old in earlier if old.event.sequence in calibration.event.ends]
+    same_kind = [old for old in earlier if calibration.event.ends_others_of(old.event)][-1:]
+    ended = ended or [old.certificate for old in same_kind if old.withdrawn and calibration.event.reason]
+    last = calibration.ended_by
+    after = last.certificate if last is not None and last.action != "revoke" else ""
+    return content.Amendment(replaces=tuple(ended), reason=calibration.event.reason if ended else "", replaced_by=after)

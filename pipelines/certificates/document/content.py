@@ -1,4 +1,4 @@
-"""What a certificate says, as one document: paper and XML are written from it, and nothing is added there."""
+"""The content of a certificate as one document: paper and XML are written from it, and nothing is added there."""
 
 from collections.abc import Sequence
 
@@ -119,7 +119,7 @@ class Adjustment(Strict):
 
 
 class Amendment(Strict):
-    """Which certificate this one replaces and what changed, or which one has replaced it (7.8.8)."""
+    """The certificate that is replaced and the change, or the certificate that has replaced this one (7.8.8)."""
 
     replaces: tuple[str, ...] = ()
     reason: str = ""

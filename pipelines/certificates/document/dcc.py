@@ -119,10 +119,10 @@ class _Writer:
                 self._expanded(real, expanded * factor, k)
 
     def _expanded(self, parent: Any, expanded: float, k: float | None) -> None:
-        own = self.add(parent, "expandedUnc", space=SI)
-        self.add(own, "uncertainty", repr(expanded), space=SI)
-        self.add(own, "coverageFactor", repr(k), space=SI)
-        self.add(own, "coverageProbability", repr(COVERAGE), space=SI)
+        element = self.add(parent, "expandedUnc", space=SI)
+        self.add(element, "uncertainty", repr(expanded), space=SI)
+        self.add(element, "coverageFactor", repr(k), space=SI)
+        self.add(element, "coverageProbability", repr(COVERAGE), space=SI)
 
     def real(self, parent: Any, value: float, unit: str, label: str = "", result: Result | None = None) -> None:
         """A quantity in SI units with its expanded uncertainty; where its unit has none, a number with the unit in its label."""
@@ -161,10 +161,10 @@ def _administrative(w: _Writer, parent: Any, c: CertificateContent) -> None:
     w.add(item, "model", c.who.item.model or c.device)
     _identifications(w, item, [("manufacturer", c.serial, "serial number")])
     laboratory = c.who.laboratory
-    place = w.add(parent, "calibrationLaboratory")
+    element = w.add(parent, "calibrationLaboratory")
     if laboratory.accreditation is not None:
-        w.add(place, "calibrationLaboratoryCode", laboratory.accreditation.number)
-    _contact(w, place, "contact", laboratory.name, laboratory.email, laboratory.address)
+        w.add(element, "calibrationLaboratoryCode", laboratory.accreditation.number)
+    _contact(w, element, "contact", laboratory.name, laboratory.email, laboratory.address)
     person = w.add(w.add(parent, "respPersons"), "respPerson")
     w.text(w.add(person, "person"), "name", c.who.signatory.name)
     w.add(person, "role", c.who.signatory.role)
@@ -176,7 +176,7 @@ def _administrative(w: _Writer, parent: Any, c: CertificateContent) -> None:
 
 
 def statements_of(c: CertificateContent) -> list[str]:
-    """What a certificate declares beside its results."""
+    """The declarations of a certificate beside its results."""
     parts = [
         f"Date of issue: {c.issued}",
         "SIMULATED: the station that these results come from is a simulation; no device was measured"
@@ -205,10 +205,10 @@ def _identifications(w: _Writer, parent: Any, entries: Iterable[tuple[str, str, 
     box = w.add(parent, "identifications")
     for issuer, value, name in entries:
         if value:
-            one = w.add(box, "identification")
-            w.add(one, "issuer", issuer)
-            w.add(one, "value", value)
-            w.text(one, "name", name)
+            identification = w.add(box, "identification")
+            w.add(identification, "issuer", issuer)
+            w.add(identification, "value", value)
+            w.text(identification, "name", name)
 
 
 def _contact(w: _Writer, parent: Any, tag: str, name: str, email: str, address: str) -> None:
@@ -227,33 +227,33 @@ def _measured(w: _Writer, parent: Any, c: CertificateContent) -> None:
         w.add(method, "norm", norm)
     if c.references:
         box = w.add(parent, "measuringEquipments")
-        for one in c.references:
-            _reference(w, box, one)
+        for reference in c.references:
+            _reference(w, box, reference)
     if c.conditions or c.adjustment.found_rms_ug is not None:
         _conditions(w, w.add(parent, "influenceConditions"), c)
     _results(w, w.add(parent, "results"), c)
     meta = w.add(parent, "measurementMetaData")
-    for one in c.conformity:
-        _conformity(w, w.add(meta, "metaData"), one, c)
+    for decision in c.conformity:
+        _conformity(w, w.add(meta, "metaData"), decision, c)
     if not c.conformity:
         w.text(w.add(meta, "metaData"), "declaration", "no statement of conformity is made")
 
 
 def _results(w: _Writer, results: Any, c: CertificateContent) -> None:
     for result in c.results:
-        own = w.add(results, "result")
-        w.text(own, "name", f"{result.quantity}, {result.axis}")
+        element = w.add(results, "result")
+        w.text(element, "name", f"{result.quantity}, {result.axis}")
         if result.value is None:
-            w.text(own, "description", "expanded uncertainty")
-        data = w.add(w.add(own, "data"), "quantity")
+            w.text(element, "description", "expanded uncertainty")
+        data = w.add(w.add(element, "data"), "quantity")
         shown = result.expanded if result.value is None else result.value
         w.real(data, shown or 0.0, result.unit, result=result)
     for response in c.responses:
         _response(w, results, response)
     if c.coefficients:
-        own = w.add(results, "result")
-        w.text(own, "name", "coefficients of the fit, as archived; their uncertainty is in the results above")
-        box = w.add(w.add(own, "data"), "list")
+        element = w.add(results, "result")
+        w.text(element, "name", "coefficients of the fit, as archived; their uncertainty is in the results above")
+        box = w.add(w.add(element, "data"), "list")
         for coefficient in c.coefficients:
             quantity = w.add(box, "quantity")
             w.text(quantity, "name", f"{coefficient.effect} {coefficient.name} {coefficient.axis}")
@@ -262,9 +262,9 @@ def _results(w: _Writer, results: Any, c: CertificateContent) -> None:
 
 def _response(w: _Writer, parent: Any, response: Response) -> None:
     """Sensitivity over frequency as lists in the order of the points, and the curve through it."""
-    own = w.add(parent, "result")
-    w.text(own, "name", f"sensitivity over frequency, {response.title}")
-    box = w.add(w.add(own, "data"), "list")
+    element = w.add(parent, "result")
+    w.text(element, "name", f"sensitivity over frequency, {response.title}")
+    box = w.add(w.add(element, "data"), "list")
     points = response.points
     for name, unit, values in (
         ("frequency", "Hz", [(p.frequency_hz, None, 0.0) for p in points]),
@@ -280,11 +280,11 @@ def _response(w: _Writer, parent: Any, response: Response) -> None:
         w.reals(box, name, unit, values)
     if (curve := response.curve) is None:
         return
-    own = w.add(parent, "result")
-    w.text(own, "name", f"curve through the sensitivity over frequency, {response.title}")
+    element = w.add(parent, "result")
+    w.text(element, "name", f"curve through the sensitivity over frequency, {response.title}")
     text = f"{curve.model}, {curve.verdict}, p {curve.p_value:.3g}, from {curve.low_hz:g} to {curve.high_hz:g} Hz"
-    w.text(own, "description", text)
-    box = w.add(w.add(own, "data"), "list")
+    w.text(element, "description", text)
+    box = w.add(w.add(element, "data"), "list")
     for p in curve.parameters:
         w.reals(box, p.name.replace("_", " "), p.unit, [(p.value, p.expanded, p.k)])
     units = [si_unit(p.unit) for p in curve.parameters]
@@ -296,16 +296,17 @@ def _response(w: _Writer, parent: Any, response: Response) -> None:
     w.reals(box, "covariance of the parameters in the units above, lower triangle row by row", "1", covariance)
 
 
-def _reference(w: _Writer, parent: Any, one: Any) -> None:
+def _reference(w: _Writer, parent: Any, reference: Any) -> None:
     box = w.add(parent, "measuringEquipment")
-    w.text(box, "name", one.what or one.id)
-    w.text(box, "description", f"due {one.due}; {one.uncertainty or 'uncertainty not stated'}")
+    w.text(box, "name", reference.what or reference.id)
+    w.text(box, "description", f"due {reference.due}; {reference.uncertainty or 'uncertainty not stated'}")
     certificate = w.add(box, "certificate")
-    w.text(certificate, "referral", f"{one.laboratory or 'laboratory not stated'}, {one.date or 'date not stated'}")
-    w.add(certificate, "referralID", one.certificate)
-    w.add(certificate, "procedure", "SHA-256" if one.sha256 else "none: no hash is stated")
-    w.add(certificate, "value", one.sha256)
-    _identifications(w, box, [("calibrationLaboratory", one.id, "reference standard")])
+    laboratory = reference.laboratory or "laboratory not stated"
+    w.text(certificate, "referral", f"{laboratory}, {reference.date or 'date not stated'}")
+    w.add(certificate, "referralID", reference.certificate)
+    w.add(certificate, "procedure", "SHA-256" if reference.sha256 else "none: no hash is stated")
+    w.add(certificate, "value", reference.sha256)
+    _identifications(w, box, [("calibrationLaboratory", reference.id, "reference standard")])
 
 
 def _conditions(w: _Writer, parent: Any, c: CertificateContent) -> None:

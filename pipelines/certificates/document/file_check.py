@@ -57,7 +57,7 @@ class CheckedFile:
 
 @dataclass(frozen=True)
 class Against:
-    """What files are compared with.
+    """The references for a check of files.
 
     trusted : certificates that vouch for signers; archive : None for the files alone
     demanded : whether the archive must know the certificate: it was named for this check
@@ -155,11 +155,11 @@ def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
             done.add("signature", "not checked", "the PDF is not signed: nothing shows that its pages are unchanged")
     beside = done.path.with_suffix(".xml")
     if beside.is_file():
-        same = _read(beside) == attached[0]
+        matches = _read(beside) == attached[0]
         done.add(
             "attachment",
-            "good" if same else "bad",
-            f"the attached XML is {beside.name}" if same else f"the attached XML differs from {beside.name}",
+            "good" if matches else "bad",
+            f"the attached XML is {beside.name}" if matches else f"the attached XML differs from {beside.name}",
         )
     return root
 
@@ -206,10 +206,10 @@ def _archive(done: CheckedFile, root: Any, against: Against) -> None:
             "archive", "not checked", "without --archive: whether the certificate was revoked or replaced is not known"
         )
         return
-    compared, place = compare(root, done.facts, against.archive, against.laboratory), against.archive.root
+    compared, where = compare(root, done.facts, against.archive, against.laboratory), against.archive.root
     if not compared.known:
         named = f"certificate {done.facts.number} of unit {done.facts.serial}"
-        done.add("archive", "bad" if against.demanded else "not checked", f"archive {place} has no {named}")
+        done.add("archive", "bad" if against.demanded else "not checked", f"archive {where} has no {named}")
         return
     for text in compared.different:
         done.add("archive", "bad", text)
@@ -222,7 +222,7 @@ def _archive(done: CheckedFile, root: Any, against: Against) -> None:
         return
     if compared.different:
         return
-    done.add("archive", "good", f"{compared.count} texts and numbers are those of the document of archive {place}")
+    done.add("archive", "good", f"{compared.count} texts and numbers are those of the document of archive {where}")
     if compared.unproven:
         done.add("laboratory", "not checked", f"not proven by the archive: {compared.unproven}")
     elif done.path.suffix.lower() != ".pdf":  # the pages of an unsigned PDF may say anything

@@ -67,7 +67,7 @@ class Written:
 
 @dataclass
 class Issued:
-    """What was written, and why not, by serial."""
+    """The certificates written; by serial, the reasons for units left out."""
 
     written: list[Written] = field(default_factory=list[Written])
     left_out: dict[str, str] = field(default_factory=dict[str, str])
@@ -95,23 +95,23 @@ def issue(
         A unit that is named has no certificate, one was revoked, or the folder cannot be written.
     """
     chosen, done = _chosen(archive, names)
-    contents = [compose(Run(archive, one.run), one, known, who) for one, known in chosen]
+    contents = [compose(Run(archive, calibration.run), calibration, known, who) for calibration, known in chosen]
     made: list[tuple[Calibration, dict[str, bytes]]] = []
-    for (one, _), content in zip(chosen, contents, strict=True):  # all are made before one is written
+    for (calibration, _), content in zip(chosen, contents, strict=True):  # all are made before one is written
         xml = dcc(content)
         document = pdf(content, xml, address.replace("{number}", content.number))
         parts = {"xml": xml, "pdf": document}
         if key is not None:
             parts["pdf"] = sign_pdf(document, key)
             parts["xml.sig"] = sign_xml(xml, key)
-        made.append((one, parts))
-    for one, parts in made:
-        stem = one.certificate.replace("/", "_")
+        made.append((calibration, parts))
+    for entry, parts in made:
+        stem = entry.certificate.replace("/", "_")
         paths = {end: folder / f"{stem}.{end}" for end in parts}
         for end, data in parts.items():
             files.publish(paths[end], data, WHERE, "give another folder with --output")
         done.written.append(
-            Written(one.certificate, one.serial, one.run, paths["pdf"], paths["xml"], paths.get("xml.sig"))
+            Written(entry.certificate, entry.serial, entry.run, paths["pdf"], paths["xml"], paths.get("xml.sig"))
         )
     return done
 
@@ -123,8 +123,8 @@ def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibrat
         serial, _, number = name.rpartition("/") if "/" in name else (name, "", "")
         known = ledger.calibrations(serial)
         if known:
-            one = _of_unit(serial, known, number)
-            chosen[one.certificate] = one, known
+            calibration = _of_unit(serial, known, number)
+            chosen[calibration.certificate] = calibration, known
         elif number or any(name in info.units for info in archive.runs()):
             raise WrongUse(f"certificate: unit {serial} has no certificate, one is needed; {_why(archive, serial)}")
         else:
@@ -133,14 +133,14 @@ def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibrat
 
 
 def _of_unit(serial: str, known: list[Calibration], number: str) -> Calibration:
-    """The certificate of a unit with a number; without one the last that was not ended, else the last."""
+    """The certificate of a unit with a number; without a number the last valid certificate, else the last."""
     if number:
-        meant = [one for one in known if str(one.event.sequence) == number]
+        meant = [calibration for calibration in known if str(calibration.event.sequence) == number]
         if not meant:
-            there = ", ".join(one.certificate for one in known)
-            raise WrongUse(f"certificate: {serial}/{number} is not in the ledger, there are {there}; give one of them")
+            listed = ", ".join(calibration.certificate for calibration in known)
+            raise WrongUse(f"certificate: {serial}/{number} is not in the ledger, there are {listed}; give one of them")
         return meant[0]
-    return next((one for one in reversed(known) if one.state == "valid"), known[-1])
+    return next((calibration for calibration in reversed(known) if calibration.state == "valid"), known[-1])
 
 
 def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibration, list[Calibration]]]:
@@ -149,9 +149,9 @@ def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibrati
     certificates: dict[str, tuple[Calibration, list[Calibration]]] = {}
     for serial, reason in reasons.items():
         known = ledger.calibrations(serial)
-        own = [one for one in known if one.run == run.id and one.state != "revoked"]
-        if own:
-            certificates[own[-1].certificate] = own[-1], known
+        of_run = [calibration for calibration in known if calibration.run == run.id and calibration.state != "revoked"]
+        if of_run:
+            certificates[of_run[-1].certificate] = of_run[-1], known
         else:
             done.left_out[serial] = (
                 reason or f"passed and not certified; certify it with 'tumbleline certificate issue {run.id}'"
@@ -173,7 +173,7 @@ def _reasons(run: Run) -> dict[str, str]:
 
 def _why(archive: Archive, serial: str) -> str:
     """Why a unit has no certificate, by the last run that graded it."""
-    for info in reversed([one for one in archive.runs() if serial in one.units]):
+    for info in reversed([info for info in archive.runs() if serial in info.units]):
         run = Run(archive, info.id)
         reason = _reasons(run).get(serial)
         if reason:

@@ -1,4 +1,4 @@
-"""What stands on the pages of a certificate: the texts and tables of its parts, with the numbers rounded."""
+"""Texts and tables on the pages of a certificate, with the numbers rounded."""
 
 import math
 from typing import Any
@@ -187,14 +187,14 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
     if not c.conformity:
         return {"title": "Conformity", "before": ["No statement of conformity is made."]}
     rows = []
-    for one in c.conformity:
-        size = abs(one.value)
-        printed = (significant(size), "") if one.expanded <= 0.0 else with_uncertainty(size, one.expanded)
-        edges = significant(one.limit), significant(one.accept, 4)
-        rows.append([one.figure, *printed, *edges, one.unit, one.outcome, probability(one.pfa)])
+    for decision in c.conformity:
+        size = abs(decision.value)
+        printed = (significant(size), "") if decision.expanded <= 0.0 else with_uncertainty(size, decision.expanded)
+        edges = significant(decision.limit), significant(decision.accept, 4)
+        rows.append([decision.figure, *printed, *edges, decision.unit, decision.outcome, probability(decision.pfa)])
     heads = ["figure", "magnitude", "U", "limit", "accepted up to", "unit", "decision", "PFA"]
     table = _table("", heads, rows, [1, *["auto"] * 7], [1, 2, 3, 4, 7])
-    passed = all(one.outcome == "pass" for one in c.conformity)
+    passed = all(decision.outcome == "pass" for decision in c.conformity)
     verdict = "meets" if passed else "does not meet in every figure"
     grade = "" if c.grade == "none" else f" (grade {c.grade})"
     before = [
@@ -206,7 +206,7 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
 
 
 def _folded(rows: tuple[Contribution, ...]) -> list[Contribution]:
-    """The rows of a budget, those that would be printed with a share of 0.0 % as one."""
+    """The rows of a budget, those that would be printed with a share of 0.0 % as one row."""
     small = [row for row in rows if row.share < SMALLEST_SHARE]
     if len(small) < 2:
         return list(rows)
@@ -225,12 +225,12 @@ def _folded(rows: tuple[Contribution, ...]) -> list[Contribution]:
 def _budgets(c: CertificateContent) -> dict[str, Any]:
     """The budgets of all results in one table: each result, then its contributions."""
     rows: list[list[str]] = []
-    for one in c.budgets:
-        u, whole, coverage = significant(one.u, 2), "", ""
-        if one.k is not None and one.expanded is not None:
-            u, whole = significant(one.u), "100 %"
-            coverage = f"k = {one.k:.2f}, U = {significant(one.expanded, 2)} {one.unit}"
-        rows.append([one.quantity, "", "", f"{u} {one.unit}", whole, coverage])
+    for budget in c.budgets:
+        u, share, coverage = significant(budget.u, 2), "", ""
+        if budget.k is not None and budget.expanded is not None:
+            u, share = significant(budget.u), "100 %"
+            coverage = f"k = {budget.k:.2f}, U = {significant(budget.expanded, 2)} {budget.unit}"
+        rows.append([budget.quantity, "", "", f"{u} {budget.unit}", share, coverage])
         rows += [
             [
                 f"– {row.name.replace('_', ' ')}",
@@ -240,7 +240,7 @@ def _budgets(c: CertificateContent) -> dict[str, Any]:
                 f"{100.0 * row.share:.1f} %",
                 row.source,
             ]
-            for row in _folded(one.rows)
+            for row in _folded(budget.rows)
         ]
     heads = ["result and its contributions", "type", "distribution", "u", "share of u²", "source, or coverage"]
     table = _table("", heads, rows, [3, "auto", "auto", "auto", "auto", 3], [3, 4])

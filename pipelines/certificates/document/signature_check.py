@@ -54,14 +54,14 @@ def _refuse_slow(data: bytes, root: Any) -> None:
     spaces = data.count(b"xmlns")
     if spaces > MOST_NAMES:
         raise SignatureBroken(f"it declares {spaces} namespaces, a certificate has at most {MOST_NAMES}")
-    for one in root.iter(NUMBERS):
-        if one.text is not None and len(one.text) > LONGEST_NUMBER:
-            name = one.tag.rpartition("}")[2]
-            raise SignatureBroken(f"{name} has {len(one.text)} characters, a number has at most {LONGEST_NUMBER}")
-    for one in root.iter():
-        if len(one.attrib) > MOST_NAMES:
+    for element in root.iter(NUMBERS):
+        if element.text is not None and len(element.text) > LONGEST_NUMBER:
+            name = element.tag.rpartition("}")[2]
+            raise SignatureBroken(f"{name} has {len(element.text)} characters, a number has at most {LONGEST_NUMBER}")
+    for element in root.iter():
+        if len(element.attrib) > MOST_NAMES:
             raise SignatureBroken(
-                f"an element has {len(one.attrib)} attributes, one of a certificate at most {MOST_NAMES}"
+                f"an element has {len(element.attrib)} attributes, one of a certificate at most {MOST_NAMES}"
             )
 
 
@@ -92,8 +92,8 @@ def xml_signature(data: bytes) -> tuple[Signer, Any]:
         raise SignatureBroken("it is not an XML signature")
     try:
         named = [
-            load_der_x509_certificate(base64.b64decode(one.text or ""))
-            for one in root.iterfind(f"{{{DSIG}}}KeyInfo/{{{DSIG}}}X509Data/{{{DSIG}}}X509Certificate")
+            load_der_x509_certificate(base64.b64decode(element.text or ""))
+            for element in root.iterfind(f"{{{DSIG}}}KeyInfo/{{{DSIG}}}X509Data/{{{DSIG}}}X509Certificate")
         ]
     except ValueError as problem:
         raise SignatureBroken(f"the certificate in the signature cannot be read ({problem})") from None
@@ -129,9 +129,9 @@ def attachments(data: bytes) -> list[bytes]:
 
 def _named(tree: Any, levels: int) -> Iterator[tuple[str, Any]]:
     """Names and values of a name tree (ISO 32000-1, 7.9.6)."""
-    own = tree.get("/Names", [])
-    for index in range(0, len(own) - 1, 2):
-        yield str(own[index]), own[index + 1]
+    names = tree.get("/Names", [])
+    for index in range(0, len(names) - 1, 2):
+        yield str(names[index]), names[index + 1]
     for child in tree.get("/Kids", []) if levels else []:
         yield from _named(child, levels - 1)
 
@@ -147,7 +147,7 @@ def pdf_signers(data: bytes) -> list[Signer]:
     reader = library("pyhanko.pdf_utils.reader", EXTRA, WHERE)
     with _read_as("the signature of the PDF cannot be read ({})"):
         embedded = reader.PdfFileReader(BytesIO(data)).embedded_regular_signatures
-        return [_pdf_signer(one) for one in embedded]
+        return [_pdf_signer(signature) for signature in embedded]
 
 
 def _pdf_signer(embedded: Any) -> Signer:
@@ -162,16 +162,16 @@ def _pdf_signer(embedded: Any) -> Signer:
         raise SignatureBroken(f"signature {name}: the signed bytes were changed after signing")
     if not status.valid:
         raise SignatureBroken(f"signature {name} is not of the key whose certificate it names")
-    whole = status.coverage is validation.SignatureCoverageLevel.ENTIRE_FILE
-    level = None if whole else status.modification_level
-    if not whole and (level is None or level is levels.OTHER or level is levels.ANNOTATIONS or not status.docmdp_ok):
+    entire = status.coverage is validation.SignatureCoverageLevel.ENTIRE_FILE
+    level = None if entire else status.modification_level
+    if not entire and (level is None or level is levels.OTHER or level is levels.ANNOTATIONS or not status.docmdp_ok):
         raise SignatureBroken(f"signature {name} does not cover the whole file: something was added after signing")
-    chain = tuple(_certificate(one) for one in embedded.other_embedded_certs)
+    chain = tuple(_certificate(certificate) for certificate in embedded.other_embedded_certs)
     return Signer(_certificate(embedded.signer_cert), chain, status.signer_reported_dt)
 
 
-def _certificate(one: Any) -> Certificate:
-    return load_der_x509_certificate(one.dump())
+def _certificate(certificate: Any) -> Certificate:
+    return load_der_x509_certificate(certificate.dump())
 
 
 @contextmanager
@@ -211,7 +211,7 @@ def facts_of(root: Any) -> CertificateFacts:
     """
     if root.tag != f"{{{DCC}}}digitalCalibrationCertificate":
         raise SignatureBroken(f"it is not a Digital Calibration Certificate: its root element is {root.tag}")
-    said = [text.strip() for text in statements(root)]
+    texts = [text.strip() for text in statements(root)]
     core = "/*/dcc:administrativeData/dcc:coreData"
     run = f"{core}/dcc:identifications/dcc:identification[dcc:name/dcc:content='run']/dcc:value/text()"
     serial = (
@@ -222,14 +222,14 @@ def facts_of(root: Any) -> CertificateFacts:
         number=first(root, f"{core}/dcc:uniqueIdentifier/text()"),
         serial=first(root, serial),
         run=first(root, run),
-        issued=_matched(ISSUED, said),
-        coefficients=_matched(COEFFICIENTS, said),
-        simulated=any(text.startswith("SIMULATED") for text in said),
+        issued=_matched(ISSUED, texts),
+        coefficients=_matched(COEFFICIENTS, texts),
+        simulated=any(text.startswith("SIMULATED") for text in texts),
     )
 
 
 def statements(root: Any) -> list[str]:
-    """What a document declares beside its results."""
+    """The declarations of a document beside its results."""
     return _all(root, "//dcc:statement/dcc:declaration/dcc:content/text()")
 
 

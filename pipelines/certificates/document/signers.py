@@ -61,10 +61,10 @@ def not_trusted(signer: Signer, trusted: Sequence[Certificate]) -> str:
     A certificate that is among the trusted ones vouches for itself, any other must lead to one of them. It has to be valid on the
     day of the check: whoever has the key of an expired one can state any time of signing.
     """
-    now, own = datetime.now(UTC), signer.certificate
-    if outside := not_valid(own, now):
+    now, certificate = datetime.now(UTC), signer.certificate
+    if outside := not_valid(certificate, now):
         return f"{outside}, and nothing proves that it was signed before: {time_of(signer)}"
-    return "" if any(own == one for one in trusted) else _path_problem(signer, trusted, now)
+    return "" if any(certificate == anchor for anchor in trusted) else _path_problem(signer, trusted, now)
 
 
 def not_valid(certificate: Certificate, now: datetime) -> str:
@@ -76,7 +76,7 @@ def not_valid(certificate: Certificate, now: datetime) -> str:
 
 
 def time_of(signer: Signer) -> str:
-    """What is known of the time of signing: no time stamp of others is written or read here."""
+    """A sentence on the time of signing; time stamps of third parties are neither written nor read."""
     if signer.when is None:
         return "the signature states no time and has no time stamp"
     return f"the time of signing, {signer.when:%Y-%m-%d %H:%M} UTC, is the signer's own statement, without a time stamp"
@@ -90,11 +90,12 @@ def _path_problem(signer: Signer, trusted: Sequence[Certificate], moment: dateti
     def loaded(certificate: Certificate) -> object:
         return asn1.Certificate.load(certificate.public_bytes(Encoding.DER))
 
+    roots = [loaded(anchor) for anchor in trusted]
     context = certvalidator.ValidationContext(
-        trust_roots=[loaded(one) for one in trusted], moment=moment, best_signature_time=moment, allow_fetching=False
+        trust_roots=roots, moment=moment, best_signature_time=moment, allow_fetching=False
     )
     validator = certvalidator.CertificateValidator(
-        loaded(signer.certificate), [loaded(one) for one in signer.chain], validation_context=context
+        loaded(signer.certificate), [loaded(certificate) for certificate in signer.chain], validation_context=context
     )
     errors = library("pyhanko_certvalidator.errors", EXTRA, WHERE)
     try:

@@ -35,7 +35,7 @@ class SigningKey:
 
 
 def read_key(path: Path, password_file: Path | None = None) -> SigningKey:
-    """The key of a PKCS#12 file, or of a PEM file with the private key and its certificates, own one first.
+    """The key of a PKCS#12 file, or of a PEM file with the private key and its certificates, that of the key first.
 
     Raises
     ------
@@ -51,27 +51,27 @@ def read_key(path: Path, password_file: Path | None = None) -> SigningKey:
         ) from None
     try:
         if b"-----BEGIN" in data:
-            key, (own, *chain) = load_pem_private_key(data, password), load_pem_x509_certificates(data)
+            key, (certificate, *chain) = load_pem_private_key(data, password), load_pem_x509_certificates(data)
         else:
-            key, own, chain = pkcs12.load_key_and_certificates(data, password)
+            key, certificate, chain = pkcs12.load_key_and_certificates(data, password)
     except (ValueError, TypeError) as problem:
         raise WrongUse(
             f"--sign-with: {path} is no key that can be used ({problem}); give a PKCS#12 file, or a PEM file with the key and "
             "its certificate, and the file of its password as --sign-with KEY,FILE where it is encrypted"
         ) from None
-    if key is None or own is None:
+    if key is None or certificate is None:
         raise WrongUse(f"--sign-with: {path} holds no key with a certificate, both are needed; give a file with both")
-    if key.public_key() != own.public_key():
+    if key.public_key() != certificate.public_key():
         raise WrongUse(
             f"--sign-with: {path}: the first certificate is not that of the key; put the key's own certificate first"
         )
-    for one in (own, *chain):
-        if outside := not_valid(one, datetime.now(UTC)):
+    for member in (certificate, *chain):
+        if outside := not_valid(member, datetime.now(UTC)):
             raise WrongUse(
-                f"--sign-with: {path}: {outside} ({one.subject.rfc4514_string()}); nothing was signed: renew it, and give "
+                f"--sign-with: {path}: {outside} ({member.subject.rfc4514_string()}); nothing was signed: renew it, and give "
                 "the new file"
             )
-    return SigningKey(key, own, tuple(chain))
+    return SigningKey(key, certificate, tuple(chain))
 
 
 def sign_pdf(document: bytes, key: SigningKey) -> bytes:
@@ -99,7 +99,7 @@ def sign_xml(document: bytes, key: SigningKey) -> bytes:
     """
     signxml = library("signxml", EXTRA, WHERE)
     etree = library("lxml.etree", EXTRA, WHERE)
-    chain = [one.public_bytes(Encoding.PEM).decode() for one in (key.certificate, *key.chain)]
+    chain = [certificate.public_bytes(Encoding.PEM).decode() for certificate in (key.certificate, *key.chain)]
     private = key.key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     algorithm = "ecdsa-sha256" if isinstance(key.key, ec.EllipticCurvePrivateKey) else "rsa-sha256"
     signer = signxml.XMLSigner(

@@ -1,1 +1,1 @@
-"""What commands print, from their documents."""
+"""The printed texts of commands, from their documents."""

@@ -35,8 +35,8 @@ def _print_class(document: dict[str, Any], named: str) -> None:
     group = next(group for group in document["not_told_apart"] if document["hidden"]["effect"] in group)
     added = [name for name in document["added"] if name in group]
     others = ", ".join(name for name in group if name not in added)
-    one = f"the added effect, {' and '.join(added)}, is one of a class" if added else "nothing of its class was added"
-    text = f"The diagnosis named {named}. Found in a class, not separated: {one}; these data fit equally well with {others}."
+    found = f"the added effect, {' and '.join(added)}, is one of a class" if added else "nothing of its class was added"
+    text = f"The diagnosis named {named}. Found in a class, not separated: {found}; these data fit equally well with {others}."
     say(text, style="bold yellow")
     rows = [row for row in document["next_measurements"] if set(row["why"].split(":")[0].split(" | ")) & set(group)]
     if not rows:
@@ -66,14 +66,14 @@ def print_discovery_demo(document: DiscoveryDemo) -> None:
         say(f"    {scope_text(row)}")
     if document["compared"]:
         say("\n2. The effect is added to the model of every lot.", style="bold cyan")
-    for one in document["compared"]:
-        confirmed = next(row["confirmed"] for row in document["discoveries"] if row["id"] == one["id"])
+    for comparison in document["compared"]:
+        confirmed = next(row["confirmed"] for row in document["discoveries"] if row["id"] == comparison["id"])
         later = "too few lots were measured since it was found"
         if confirmed is not None:
             later = f"lots after that night {'confirm' if confirmed else 'do not confirm'} it"
         say(
-            f"{one['id']}: {short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg, evidence "
-            f"e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}; {later}"
+            f"{comparison['id']}: {short(comparison['size_ug_before'])} → {short(comparison['size_ug_after'])} µg, evidence "
+            f"e^{short(comparison['log_e_before'])} → e^{short(comparison['log_e_after'])}; {later}"
         )
     hidden = document["hidden"]
     say(f"\n{3 if document['compared'] else 2}. What was hidden?", style="bold cyan")

@@ -46,8 +46,8 @@ def print_diagnosis(
     if brief:
         for text in sentences.cost_to_decide(document):
             say(text)
-        told = sentences.not_listed(document)
-        _dim(f"{told + '; ' if told else ''}--all lists effects, drivers and the dwells that decide")
+        notes = sentences.not_listed(document)
+        _dim(f"{notes + '; ' if notes else ''}--all lists effects, drivers and the dwells that decide")
     else:
         for section in (sections.unseen, sections.unseen_in_part, sections.hidden_by_noise):
             print_section(section(document))

@@ -50,13 +50,16 @@ def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, 
 
 
 def _beside(document: DiscoverDocument) -> None:
-    """What is no discovery: unexplained evidence, what a model leaves, what may be the station's own wander."""
+    """Print what is no discovery: unexplained evidence, remainders of a model, evidence that may be wander of the station."""
     for found in document["unexplained"]:
         say(unexplained_text(found), style="yellow" if found["id"] in document["new"] else "")
-    for one in document["compared"]:
-        sizes = f"{short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg"
-        evidence = f"evidence e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}"
-        say(f"{one['id']} with {one['recommended']} in every lot's model: {sizes}, {evidence}", style="green")
+    for comparison in document["compared"]:
+        sizes = f"{short(comparison['size_ug_before'])} → {short(comparison['size_ug_after'])} µg"
+        evidence = f"evidence e^{short(comparison['log_e_before'])} → e^{short(comparison['log_e_after'])}"
+        say(
+            f"{comparison['id']} with {comparison['recommended']} in every lot's model: {sizes}, {evidence}",
+            style="green",
+        )
     for finding in document["population"]:
         say(_of_population(finding), style="yellow")
     for row in document["held"][:_SHOWN_HELD]:
@@ -119,16 +122,16 @@ def print_explained(row: DiscoveryRow | UnexplainedRow) -> None:
 
 
 def _reach(document: DiscoverDocument) -> None:
-    """What the archive could have shown, by effect."""
+    """Print the smallest size of each effect that the archive would have shown."""
     if not document["reach"]:
         return  # the warnings say how many lots are needed
     rows: dict[str, dict[str, str]] = {}
     for row in document["reach"]:
-        own = rows.setdefault(row["effect"], {})
-        own[row["driver"]] = short(row["smallest_ug"])
-        own[f"{row['driver']} lots"] = str(row["lots_to_1_ug"] or "")
+        cells = rows.setdefault(row["effect"], {})
+        cells[row["driver"]] = short(row["smallest_ug"])
+        cells[f"{row['driver']} lots"] = str(row["lots_to_1_ug"] or "")
     keys = ("mean", "mean lots", "inside lots", "inside lots lots")
-    lines = [[effect, *(own.get(key, "") for key in keys)] for effect, own in rows.items()][:_SHOWN_REACH]
+    lines = [[effect, *(cells.get(key, "") for key in keys)] for effect, cells in rows.items()][:_SHOWN_REACH]
     print_table(
         ["effect", "common\nto all\nµg", "lots\nto 1 µg", "inside\nlots\nµg", "lots\nto 1 µg"],
         lines,

@@ -29,15 +29,15 @@ def print_view(view: EffectView) -> None:
     drawn = [_side(view, name, beside if beside >= LEAST else width) for name, _ in view.sides]
     say(f"{view.title}: {view.where}, in µg; line: {_line_is(view)}", style="bold")
     if beside >= LEAST:
-        for parts in zip_longest(*(one.split("\n") for one in drawn)):
+        for parts in zip_longest(*(side.split("\n") for side in drawn)):
             line = parts[0].copy()
             for part in parts[1:]:
                 line.pad_right(beside + GAP - line.cell_len)
                 line.append_text(part)
             console().print(line, soft_wrap=True)
     else:
-        for one in drawn:
-            console().print(one)
+        for side in drawn:
+            console().print(side)
     say(f"across: {view.quantity}", style="dim")
 
 

@@ -57,19 +57,19 @@ def _ladder(rows: list[LadderRow]) -> None:
         for key, text in ERRORS.items()
         if any(row[key] is not None for row in rows)
     ]
-    print_table(["error, µg rms", *heads], lines, title="Error by version of the model", whole=0)
+    print_table(["error, µg rms", *heads], lines, title="Error by version of the model", fixed=0)
     for row in rows[1:]:
         style = {True: "bold green", False: "bold red", None: "yellow"}[row["confirmed"]]
         say(f"{', '.join(row['added'])}: {row['text']}", style=style)
 
 
 def next_lines(
-    document: ImproveDocument, files: tuple[Path | None, Path], find: FindData, given: Given, kept: Sequence[str]
+    document: ImproveDocument, files: tuple[Path | None, Path], find: FindData, given: Given, repeated: Sequence[str]
 ) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
-    files : the model that was judged, None for a list of effects, and the one to write
-    kept : options of ``improve`` that name the file to write and the author, as they were given
+    files : the model that was judged, None for a list of effects, and the model file to write
+    repeated : options of ``improve`` that name the file to write and the author, as they were given
     """
     from pipelines.cli.history import removal
 
@@ -81,8 +81,8 @@ def next_lines(
         return []
     data = find()
     judged = target if document["added"] else model
-    own = ["--model", str(judged)] if judged else ["--effects", ",".join(document["effects"])]
-    again = ["improve", data.source, *own, *data.options, *([] if data.measure else data.again), *kept]
+    model_option = ["--model", str(judged)] if judged else ["--effects", ",".join(document["effects"])]
+    again = ["improve", data.source, *model_option, *data.options, *([] if data.measure else data.again), *repeated]
     if left:
         names = (left[0]["effect"], *left[0]["not_separated_from"])
         return [command_line(*again, "--effect", name) for name in names]
@@ -99,14 +99,14 @@ STYLES = ("cyan", "green", "magenta")
 
 def print_recording(document: ImproveDocument) -> None:
     """Print an improvement that began with a recording."""
-    one, judged = document.get("recording"), document["after"] or document["diagnosis"]
-    if one is None:
+    recording, judged = document.get("recording"), document["after"] or document["diagnosis"]
+    if recording is None:
         return
-    _recognised(one)
+    _recognised(recording)
     print_verdict(judged)
     if not document["added"]:  # residuals and coefficients are those of the model of the import
-        _picture(one)
-    for line in one["lines"]:
+        _picture(recording)
+    for line in recording["lines"]:
         if line.startswith("CHECK") or (": bias" in line and not document["added"]):
             say(f"  {line}", style="yellow" if line.startswith("CHECK") else "")
     for text in filter(None, (sentences.evidence_text(judged), sentences.undetected(judged))):
@@ -118,11 +118,11 @@ def print_recording(document: ImproveDocument) -> None:
 
 
 def next_of_recording(
-    document: ImproveDocument, recording: RecordingDocument, given: Given, model: Sequence[str], kept: Sequence[str]
+    document: ImproveDocument, recording: RecordingDocument, given: Given, model: Sequence[str], repeated: Sequence[str]
 ) -> list[str]:
     """The commands to give next: the fit of a changed model; without faulty dwells, else the coefficients, else the diagnosis.
 
-    model, kept : options of ``improve``: the model that was judged; the file to write and the author
+    model, repeated : options of ``improve``: the model that was judged; the file to write and the author
     """
     data = JudgedData(recording["run"], "", given.fresh, given.fresh_history, given=given)
     run, words = data.source, archive_words(given.archive)
@@ -131,13 +131,13 @@ def next_of_recording(
     if document["next"]:
         return document["next"]
     judged = document["after"] or document["diagnosis"]
-    left = [f"{one['unit']}:{one['dwell']}" for one in (judged["leave_out"] or {"dwells": []})["dwells"]]
+    left = [f"{entry['unit']}:{entry['dwell']}" for entry in (judged["leave_out"] or {"dwells": []})["dwells"]]
     for fault in judged["blocked_by"]:
         left += [f"{unit}:{dwell}" for unit in fault["units"] for dwell in fault["dwells"]]
     if left:
         without = replace(given, leave_out=",".join(dict.fromkeys([*filter(None, [given.leave_out]), *left])))
-        own = [*model, *replace(data, given=without).options, *data.again, *kept]
-        return [command_line("improve", run, *own)]
+        option_words = [*model, *replace(data, given=without).options, *data.again, *repeated]
+        return [command_line("improve", run, *option_words)]
     if recording["fit"] is None and judged["adequate"] is not False:
         return [command_line("fit", run, "--effects", ",".join(document["effects"]), *words)]
     if judged["adequate"]:
@@ -145,21 +145,25 @@ def next_of_recording(
     return [command_line("diagnose", run, "--all", *model, *data.options)]
 
 
-def _recognised(one: RecordingDocument) -> None:
-    rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
-    axes = ", ".join(one["columns"][axis] for axis in "xyz")
-    say(f"{', '.join(one['files'])}: {one['form']}, {one['rows']} rows{rate}; {number_of(one['dwells'], 'dwell')}")
-    say(f"  x, y, z: {axes} ({one['reason']}); in {one['output_unit']}: {one['output_reason']}", style="dim")
-    for text in [*one["assumed"], *one["remarks"]][:MOST_REMARKS]:
+def _recognised(recording: RecordingDocument) -> None:
+    rate = "" if recording["rate_hz"] is None else f", {recording['rate_hz']:.5g} Hz"
+    axes = ", ".join(recording["columns"][axis] for axis in "xyz")
+    rows = f"{recording['rows']} rows{rate}; {number_of(recording['dwells'], 'dwell')}"
+    say(f"{', '.join(recording['files'])}: {recording['form']}, {rows}")
+    say(
+        f"  x, y, z: {axes} ({recording['reason']}); in {recording['output_unit']}: {recording['output_reason']}",
+        style="dim",
+    )
+    for text in [*recording["assumed"], *recording["remarks"]][:MOST_REMARKS]:
         say(f"  {text}", style="dim")
-    say(one["command"])
-    say(f"  kept as run {one['run']}", style="dim")
+    say(recording["command"])
+    say(f"  kept as run {recording['run']}", style="dim")
 
 
-def _picture(one: RecordingDocument) -> None:
+def _picture(recording: RecordingDocument) -> None:
     """The residual of the norm by dwell, or the drift of the outputs of one pose."""
-    rows = one["dwell_list"]
-    if len(rows) < 3 or one["fit"] == "faces" or _POSED & set(one["columns"]):
+    rows = recording["dwell_list"]
+    if len(rows) < 3 or recording["fit"] == "faces" or _POSED & set(recording["columns"]):
         return
     times = [0.5 * (row["start_s"] + row["end_s"]) for row in rows]
     if rows[0]["residual_ug"] is not None:
@@ -167,7 +171,7 @@ def _picture(one: RecordingDocument) -> None:
         lines = [Line("residual", "cyan", [(t, unit * row["residual_ug"]) for t, row in zip(times, rows, strict=True)])]
     else:
         first = rows[0]["mean"]
-        title = f"output since the first block, thousandths of {one['output_unit']}"
+        title = f"output since the first block, thousandths of {recording['output_unit']}"
         lines = [
             Line(axis, style, [(t, 1e3 * (row["mean"][k] - first[k])) for t, row in zip(times, rows, strict=True)])
             for k, (axis, style) in enumerate(zip("xyz", STYLES, strict=True))
@@ -177,11 +181,11 @@ def _picture(one: RecordingDocument) -> None:
 
 
 def _missing(document: ImproveDocument) -> None:
-    """What is missing, what was added, and the errors on dwells that were left out."""
+    """Print missing effects, added effects, and the errors on dwells that were left out."""
     for choice in document["choices"]:
         others = ", ".join(choice["not_separated_from"])
-        alike = f" (these data do not separate it from {others})" if others else ""
-        say(f"  missing: {choice['effect']}{alike}; {'added' if choice['added'] else 'not added'}", style="yellow")
+        class_note = f" (these data do not separate it from {others})" if others else ""
+        say(f"  missing: {choice['effect']}{class_note}; {'added' if choice['added'] else 'not added'}", style="yellow")
     for fault in document["diagnosis"]["blocked_by"]:
         dwells = ", ".join(map(str, fault["dwells"])) or "all"
         say(f"  data fault {fault['fault']}, dwells {dwells}: {fault['evidence']}", style="bold red")

@@ -43,9 +43,9 @@ def print_plan(document: dict[str, Any]) -> None:
     print_table(
         ["visible effect", "v", "1/v²", "floor, µg", "floor of the coefficient"], [_visible_line(row) for row in seen]
     )
-    alike = [[row["effect"], _aliases(row)] for row in seen if row["alias"]]
-    if alike:
-        print_table(["visible effect", "confounded with"], alike)
+    aliased = [[row["effect"], _aliases(row)] for row in seen if row["alias"]]
+    if aliased:
+        print_table(["visible effect", "confounded with"], aliased)
     faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
         say(f"* seen only where larger than usual: {', '.join(faint)}")
@@ -128,8 +128,8 @@ def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     lines = side_by_side(rows, lambda row: short(row["uncertainty_ug"]), "unit")
     axes = [["*" if "*" in line["cells"] else "x", "y", "z"] for line in lines]
     return [
-        [f"{line['title']}, {line['unit']}", *(line["cells"].get(axis, "") for axis in own)]
-        for line, own in zip(lines, axes, strict=True)
+        [f"{line['title']}, {line['unit']}", *(line["cells"].get(axis, "") for axis in columns)]
+        for line, columns in zip(lines, axes, strict=True)
     ]
 
 
@@ -192,8 +192,8 @@ def print_reach(reach: dict[str, Any] | None) -> None:
     for line in reach["remarks"]:
         say(line)
     for name, key in (("limit out of reach", "unreachable"), ("limit at risk", "at_risk")):
-        for one in reach[key]:
-            say(f"{name}: {plain_reason(one)}")
+        for reason in reach[key]:
+            say(f"{name}: {plain_reason(reason)}")
 
 
 ERROR_HEADS = ("coefficient, unit", "error\n1σ", "required", "ratio", "given\n1σ")
@@ -206,9 +206,9 @@ def print_optimum(document: dict[str, Any], where: Sequence[str]) -> None:
         f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
         f"in {document['poses']} poses, {'ramps to' if document['ramp'] else 'soaks at'} {temperatures} °C"
     )
-    minutes, own, textbook = document["minutes"], document["own_minutes"], document["textbook_minutes"]
+    minutes, given, textbook = document["minutes"], document["own_minutes"], document["textbook_minutes"]
     parts = [
-        [name.replace("_", " "), f"{minutes[name]:.0f}", f"{own[name]:.0f}", f"{textbook[name]:.0f}"]
+        [name.replace("_", " "), f"{minutes[name]:.0f}", f"{given[name]:.0f}", f"{textbook[name]:.0f}"]
         for name in minutes
     ]
     print_table(["station time, min", "new recipe", document["from"], "textbook plan"], parts)
@@ -216,7 +216,7 @@ def print_optimum(document: dict[str, Any], where: Sequence[str]) -> None:
         say(line)
     if document["rivals"]:
         lines = [[r["true"], r["wrong"], short(r["chi_square"]), short(r["textbook"])] for r in document["rivals"]]
-        print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, whole=2)
+        print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, fixed=2)
     else:
         print_table(ERROR_HEADS, _error_lines(document["coefficients"]))
         say(f"error: of the new recipe; given: of {document['from']}", style="dim")
@@ -232,7 +232,7 @@ def print_optimum(document: dict[str, Any], where: Sequence[str]) -> None:
 
 
 def _comparison(document: dict[str, Any]) -> list[str]:
-    """Sentences that compare the new recipe with the own one and the textbook plan."""
+    """Sentences that compare the new recipe with the given recipe and the textbook plan."""
     name, more = document["from"], document["minutes"]["total"] - document["own_minutes"]["total"]
     difference = (
         f"{abs(more):.0f} min {'more' if more > 0.0 else 'less'} than {name}" if abs(more) >= 0.5 else f"as {name}"

@@ -61,7 +61,7 @@ def table_text(width: int, *args: object, **kwargs: object) -> str:
 
 @pytest.mark.parametrize("width", [20, 40, 60, 80, 200])
 def test_no_number_and_no_heading_is_ever_cut_and_words_are_broken_before_the_table_grows(width: int) -> None:
-    text = table_text(width, COLUMNS, LINES, whole=6)
+    text = table_text(width, COLUMNS, LINES, fixed=6)
     for word in ("scale_temperature_quadratic (αT2)", "sensor", "181", "1e-212", "392", "425", "size", "left out"):
         assert word in text
     text = table_text(width, ["unit", "why"], [["U1", "the proof mass hangs on an arm that load turns " * 5]])

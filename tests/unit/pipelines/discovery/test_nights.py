@@ -137,7 +137,7 @@ def test_a_revoked_run_is_taken_out_from_that_night_on(archive: Archive) -> None
     (Path(str(archive.root)) / "discovery" / "DEMO" / "state").unlink()
     replayed = brought_up(again)
     assert replayed.order == state.order
-    assert {(a.driver, a.place) for a in replayed.alarms} == {(a.driver, a.place) for a in state.alarms}
+    assert {(a.driver, a.index) for a in replayed.alarms} == {(a.driver, a.index) for a in state.alarms}
     assert state.alarms
 
 
@@ -247,7 +247,7 @@ def test_an_effect_as_a_whole_is_held_back_with_the_axes_that_carry_it(archive: 
             patch.setattr(type(sensor), "shared_by_stations", lambda _, flags=shared: flags)
             patch.setattr(type(sensor), "guarded", np.zeros(sensor.count, dtype=bool))
             assert held(state, alarm) is is_held
-            assert held(state, replace(alarm, place=int(axes[1])))
+            assert held(state, replace(alarm, index=int(axes[1])))
 
 
 def test_a_damaged_run_is_told_and_pooled_once_it_is_restored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
