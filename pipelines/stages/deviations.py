@@ -165,7 +165,7 @@ def _largest(mixture: Array, tau: Array, statistic: Statistic) -> list[int | Non
         [3.0 * q**2 / tau**2, n**2 / tau, np.broadcast_to((FLICKER_FLOOR * b) ** 2, tau.shape), k**2 * tau / 3.0, ramp]
     )
     powers = [*POWER.values(), None]
-    return [powers[place] for place in np.argmax(shares, axis=0)]
+    return [powers[largest] for largest in np.argmax(shares, axis=0)]
 
 
 def _interval(statistic: Statistic, powers: list[int | None], m: Index, n: int) -> Array:

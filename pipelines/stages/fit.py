@@ -129,8 +129,8 @@ def _prior_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
         {
             "unit": picked(lot.units, u),
             "axis": picked(lot.letters, a),
-            "effect": picked([effect for own in names for effect, _ in own], a * len(names[0]) + c),
-            "name": picked([name for own in names for _, name in own], a * len(names[0]) + c),
+            "effect": picked([effect for terms in names for effect, _ in terms], a * len(names[0]) + c),
+            "name": picked([name for terms in names for _, name in terms], a * len(names[0]) + c),
             "mean": prior.mean[u, a, c],
             "standard_deviation": deviation[u, a, c],
             "share": fitted.of_prior.ravel(),
@@ -231,16 +231,16 @@ def _bias_of(lot: LotArrays, fitted: NoisyFit, scale: Array) -> dict[str, Array]
         return {name: np.full(scale.shape, np.nan) for name in COLUMNS}
     used = lot.of_kind("dwell")
     errors = np.sqrt(np.diagonal(fitted.fit.covariance, axis1=-2, axis2=-1))
-    own = np.mean(lot.standard_error[:, used] ** 2, axis=1)
+    counted = np.mean(lot.standard_error[:, used] ** 2, axis=1)
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0]
     carried = fitted.walk_shown or np.ptp(time[used]) >= LONG_S
     walk = fitted.walk if carried else np.zeros_like(fitted.walk)
-    excess = np.sqrt(np.maximum(fitted.white**2 - own, 0.0) + 0.5 * (fitted.walk**2 - walk**2))
-    record = np.stack([errors[:, axis, place] for axis, place in enumerate(places)], axis=1)
+    excess = np.sqrt(np.maximum(fitted.white**2 - counted, 0.0) + 0.5 * (fitted.walk**2 - walk**2))
+    record = np.stack([errors[:, axis, column] for axis, column in enumerate(places)], axis=1)
     record, flicker, walk, excess = (MICRO * part / scale for part in (record, fitted.flicker, walk, excess))
     noise = BiasNoise(
         error=record,
-        gain=np.stack([fitted.gain[:, axis, place] for axis, place in enumerate(places)], axis=1),
+        gain=np.stack([fitted.gain[:, axis, column] for axis, column in enumerate(places)], axis=1),
         flicker=flicker,
         carried=walk,
         excess=excess,

@@ -132,9 +132,9 @@ class _Belief:
 
 def _felt(lot: LotArrays, used: Flags) -> Array:
     """Force along the sensors' own axes at every dwell, (units, n, 3), g; misalignment from the dwells of the fit alone."""
-    force, own = lot.state.force, lot.state.force[:, used]
+    force, fitted = lot.state.force, lot.state.force[:, used]
     theta = None if lot.state.theta is None else np.broadcast_to(lot.state.theta, lot.output.shape[:2])[:, used]
-    turn = pseudo_inverses(own) @ felt_force(own, lot.output[:, used], theta, lot.state.axes)
+    turn = pseudo_inverses(fitted) @ felt_force(fitted, lot.output[:, used], theta, lot.state.axes)
     return force @ turn
 
 
@@ -174,13 +174,13 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: Flags, believed: _Belief | No
         covariance, of_prior = both.covariance, both.share
     unseen = columns[..., ~used, :]
     model = np.einsum("...np,...pq,...mq->...nm", unseen, covariance, unseen)
-    own = np.swapaxes(noise[:, ~used] ** 2, -1, -2)
+    variance = np.swapaxes(noise[:, ~used] ** 2, -1, -2)
     return NoisyFit(
         method="birge",
         fit=replace(plain, covariance=covariance),
         noise=noise,
         expected=noise,
-        predicted=model + own[..., None] * np.eye(own.shape[-1]),
+        predicted=model + variance[..., None] * np.eye(variance.shape[-1]),
         white=np.sqrt(np.mean(noise**2, axis=1)),
         flicker=np.zeros_like(stretch),
         walk=np.zeros_like(stretch),

@@ -42,12 +42,14 @@ def procedures(
         procedure = PROCEDURES[part.kind]
         if not isinstance(procedure, Evaluated):
             continue  # its records are those of the stages reduce, fit, verify and noise
-        own = [(record, step) for record, (of, step) in enumerate(steps) if of == number and step.kind == "procedure"]
-        if not own:
+        numbered = [
+            (record, step) for record, (of, step) in enumerate(steps) if of == number and step.kind == "procedure"
+        ]
+        if not numbered:
             continue
         records = (
             procedure_record(record, step, samples({record}), _answered(readings, record, accepted), recipe.sensor_axes)
-            for record, step in own
+            for record, step in numbered
         )
         results.append((number, part.kind, *_analysed(procedure, part, records, device, accepted)))
     return procedure_tables(results)
@@ -79,8 +81,8 @@ def _analysed(
 
 def _answered(readings: pd.DataFrame, record: int, accepted: list[str]) -> pd.DataFrame:
     """Readings of a record of the accepted units that answered."""
-    own = readings[(readings["record"] == record) & (readings["status"] == "ok")]
-    return own[own["unit"].isin(accepted)]
+    answered = readings[(readings["record"] == record) & (readings["status"] == "ok")]
+    return answered[answered["unit"].isin(accepted)]
 
 
 def _device(readings: pd.DataFrame, coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Device:
@@ -109,4 +111,4 @@ def identified_noise(terms: pd.DataFrame | None) -> dict[tuple[str, str], Identi
     for row in terms[terms["term"].isin(["B", "K"])].to_dict("records"):
         ends = float(row["value"]), float(row["low"]), float(row["high"])
         of.setdefault((str(row["unit"]), str(row["axis"])), {})[str(row["term"])] = ends
-    return {key: IdentifiedNoise(one["B"], one["K"]) for key, one in of.items()}
+    return {key: IdentifiedNoise(terms["B"], terms["K"]) for key, terms in of.items()}

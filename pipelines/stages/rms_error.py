@@ -54,7 +54,7 @@ def rms_uncertainty(error: Array, covariance: Array) -> Array:
     m = error.shape[-1]
     moved = np.einsum("...jk,...k->...j", covariance, error)
     squared = covariance @ covariance
-    traces = [np.einsum("...jj->...", one) for one in (covariance, squared)]
+    traces = [np.einsum("...jj->...", matrix) for matrix in (covariance, squared)]
     traces.append(np.einsum("...jk,...kj->...", squared, covariance))
     square = np.sum(error**2, axis=-1)
     share = np.maximum(1.0 - (traces[0] + np.sqrt(2.0 * traces[1])) / np.maximum(square, _TINY), 0.0)

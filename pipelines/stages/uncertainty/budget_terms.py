@@ -54,7 +54,9 @@ class BudgetTables:
         lots = (self.lot or LotTables(self.dwells, self.history)).parts
         if self.coefficients.empty or len(lots) == 1:
             return [] if self.coefficients.empty else [self]
-        tables = {one.name: value for one in fields(self) if isinstance(value := getattr(self, one.name), pd.DataFrame)}
+        tables = {
+            field.name: value for field in fields(self) if isinstance(value := getattr(self, field.name), pd.DataFrame)
+        }
         return [
             replace(
                 self, lot=lot, calibration=None, **{name: own_rows(table, lot.dwells) for name, table in tables.items()}
@@ -90,11 +92,17 @@ class BudgetTerms:
 
         None as well for runs of earlier versions, which state no nominal supply and are as they were read.
         """
-        own = self.stability
+        unit = self.stability
         supply = None if self.stated is None else self.stated.supply
-        if own is None or own.supply_V is None or supply is None or not supply.ratio_measured or own.ratiometric == 0.0:
+        if (
+            unit is None
+            or unit.supply_V is None
+            or supply is None
+            or not supply.ratio_measured
+            or unit.ratiometric == 0.0
+        ):
             return None
-        return FollowedSupply(own.supply_V, own.ratiometric)
+        return FollowedSupply(unit.supply_V, unit.ratiometric)
 
     @property
     def switch_on_dof(self) -> float:
@@ -148,8 +156,8 @@ def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
     station, recipe = about.get("station") or {}, about.get("recipe") or {}
     stated = merged(
         *(
-            Uncertainty.model_validate(one["uncertainty"]) if one.get("uncertainty") else None
-            for one in (station, recipe)
+            Uncertainty.model_validate(part["uncertainty"]) if part.get("uncertainty") else None
+            for part in (station, recipe)
         )
     )
     if stated is None:
@@ -160,7 +168,7 @@ def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
         stated=stated,
         stability=Stability.model_validate(stability) if stability else None,
         certificate=CertificateTerms.model_validate(certificate or {"validity_months": months}),
-        references=tuple(Reference.model_validate(one) for one in station.get("reference", [])),
+        references=tuple(Reference.model_validate(reference) for reference in station.get("reference", [])),
         soak_min_s=float(recipe.get("soak_min_s", 0.0)),
         dwell_s=float(recipe.get("dwell_s", 1.0)),
         room_C=float((station.get("pace") or {}).get("room_C", Pace().room_C)),

@@ -75,7 +75,7 @@ def _evidence(
     if stated.pose is not None:  # their repeatability also where the budget leaves it to the scatter of the fit
         stated = stated.model_copy(update={"pose": stated.pose.model_copy(update={"seen_in_residuals": False})})
     inputs, scattered = influences(stated, conditions(lot, tables.dwells, calibration.response, terms), terms.stability)
-    common = [one for one in inputs if one.scope in COMMON]
+    common = [error for error in inputs if error.scope in COMMON]
     whole = sensitivity(physical, state, common, scattered)
     shape = (*lot.output.shape, -1)
     along = _each_dwell(ALONG_G * difference(physical, state, Errors(gravity=1.0)), lot.output.shape)
@@ -114,10 +114,10 @@ def _noise(lot: LotArrays, left: Array, effects: Sequence[str]) -> Array:
     units = len(lot.units)
     scale = np.sqrt(np.mean(lot.standard_error**2, axis=1))
     common = np.mean(left, axis=0)
-    own = fitted_with_noise(replace(lot, output=lot.output - common, kinds=np.full_like(lot.kinds, DWELL)), effects)
+    fitted = fitted_with_noise(replace(lot, output=lot.output - common, kinds=np.full_like(lot.kinds, DWELL)), effects)
     time = np.broadcast_to(lot.state.time, lot.output.shape[:2])[0]
     flicker, walk = wander_kernels(time)
-    profile = np.moveaxis(lot.standard_error / scale[:, None, :], 1, -1) * own.white[..., None]
+    profile = np.moveaxis(lot.standard_error / scale[:, None, :], 1, -1) * fitted.white[..., None]
     total = profile[..., None] ** 2 * np.eye(time.size)
-    total = total + own.flicker[..., None, None] ** 2 * flicker + own.walk[..., None, None] ** 2 * walk
+    total = total + fitted.flicker[..., None, None] ** 2 * flicker + fitted.walk[..., None, None] ** 2 * walk
     return total * units / (units - 1.0)

@@ -64,9 +64,9 @@ def largest_error(axes: list[AxisErrors], switch_on_dof: float) -> tuple[Array, 
     influences = ndtri(uniform[:, :q])
     out = np.zeros((2, units))
     forms = [_form(axis, influences) for axis in axes]
-    own = [uniform[:, q + OF_AXIS * k : q + OF_AXIS * (k + 1)] for k in range(len(axes))]
-    normal = [ndtri(columns) for columns in own]
-    again = [stdtrit(switch_on_dof, columns[:, 2]) for columns in own]
+    draws = [uniform[:, q + OF_AXIS * k : q + OF_AXIS * (k + 1)] for k in range(len(axes))]
+    normal = [ndtri(columns) for columns in draws]
+    again = [stdtrit(switch_on_dof, columns[:, 2]) for columns in draws]
     for unit in range(units):
         largest = np.zeros(DRAWS)
         for axis, form, z, switched in zip(axes, forms, normal, again, strict=True):
@@ -182,10 +182,10 @@ def instability_of(tables: BudgetTables, unit: str, axis: str) -> float:
 
 def _of_record(noise: pd.DataFrame, unit: str, axis: str, term: str) -> tuple[float, bool]:
     """A term of the static record, else its upper limit, and whether it is identified; nan without a record."""
-    own = noise[(noise["unit"] == unit) & (noise["axis"] == axis) & (noise["term"] == term)] if len(noise) else noise
-    if not len(own):
+    terms = noise[(noise["unit"] == unit) & (noise["axis"] == axis) & (noise["term"] == term)] if len(noise) else noise
+    if not len(terms):
         return float("nan"), False
-    first = own.iloc[0]
+    first = terms.iloc[0]
     identified = bool(first["identified"])
     return float(first["value"] if identified else first["high"]), identified
 
@@ -193,5 +193,5 @@ def _of_record(noise: pd.DataFrame, unit: str, axis: str, term: str) -> tuple[fl
 def _of_fit(wander: pd.DataFrame, unit: str, axis: str, name: str) -> float:
     if name not in wander:
         return float("nan")
-    own = wander[(wander["unit"] == unit) & (wander["axis"] == axis)]
-    return float(own[name].iloc[0]) if len(own) else float("nan")
+    rows = wander[(wander["unit"] == unit) & (wander["axis"] == axis)]
+    return float(rows[name].iloc[0]) if len(rows) else float("nan")
