@@ -121,7 +121,7 @@ class RecordByRecord(Evaluated):
 
     def reduce(self, part: Any, records: Records, device: Device) -> pd.DataFrame:
         """The points of every unit in every record."""
-        return point_table(row for one in taken(records) for row in self.points(part, one, device))
+        return point_table(row for measured in taken(records) for row in self.points(part, measured, device))
 
     @abstractmethod
     def points(self, part: Any, taken: Taken, device: Device) -> Iterable[Mapping[str, Any]]:

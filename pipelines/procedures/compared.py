@@ -114,7 +114,7 @@ def response_results(part: Any, rows: pd.DataFrame, out_unit: str) -> list[Compa
                                       sensitivities=of_phase, **about))  # fmt: skip
     sizes = [result for result in results if result.quantity == "response_magnitude"]
     middle = getattr(part, "level_frequency_hz", MIDDLE_HZ)
-    near = min(sizes, key=lambda one: (abs(np.log(one.setting / middle)), one.point))
+    near = min(sizes, key=lambda result: (abs(np.log(result.setting / middle)), result.point))
     return [replace(near, quantity="reference_sensitivity"), *results]
 
 
@@ -134,10 +134,10 @@ def curve_results(curve: JudgedCurve, diagnosis: TransferDiagnosis, out_unit: st
     size = abs(fit.sensitivity)
     rest = ComparedResult("curve_sensitivity", curve.axis, f"{out_unit}/g", size, {"noise": size * fit.sensitivity_error},
                           by_share(size))  # fmt: skip
-    own = [(p.unit, *fit.of(p.name)[:2]) for p in fit.parameters]
+    parameters = [(p.unit, *fit.of(p.name)[:2]) for p in fit.parameters]
     return [rest] + [
         ComparedResult(f"curve_{name}", curve.axis, unit or "1", value, {"noise": error}, point=k)
-        for k, (name, (unit, value, error)) in enumerate(zip(curve.names[1:], own, strict=True), start=1)
+        for k, (name, (unit, value, error)) in enumerate(zip(curve.names[1:], parameters, strict=True), start=1)
     ]
 
 
@@ -162,7 +162,7 @@ def transfer_curve(axis: str, diagnosis: TransferDiagnosis, frequency: Array) ->
 
 def reason_of(diagnosis: Judged[Any]) -> str:
     """What a model lacks, or why it cannot be judged; empty where neither is known."""
-    missing = [" or ".join(one.effects) for one in diagnosis.classes]
+    missing = [" or ".join(missed.effects) for missed in diagnosis.classes]
     return diagnosis.reason or (f"it lacks {', '.join(missing)}" if missing else "")
 
 

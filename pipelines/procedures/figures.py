@@ -106,7 +106,7 @@ def worst(values: Sequence[FigureValue]) -> FigureValue:
         bound = abs(value.value) + 2.0 * value.uncertainty
         return bound if np.isfinite(bound) else np.inf  # max() passes over a nan that is not the first
 
-    missing = next((one for one in values if not one.identified), None)
+    missing = next((value for value in values if not value.identified), None)
     if missing is not None:
         return missing
     deciding = max(values, key=size)
@@ -126,23 +126,23 @@ def interval_of_largest(values: Sequence[FigureValue], sign: float) -> tuple[flo
     """
     ends = [_ends(value) for value in values]
     magnitudes = [
-        (low, high) if one.value >= 0.0 else (-high, -low) for one, (low, high) in zip(values, ends, strict=True)
+        (low, high) if figure.value >= 0.0 else (-high, -low) for figure, (low, high) in zip(values, ends, strict=True)
     ]
     tail = 1.0 - (1.0 - TAIL) ** (1.0 / len(values))
-    inner = max(_lower(one, low, tail) for one, (low, _) in zip(values, magnitudes, strict=True))
+    inner = max(_lower(value, low, tail) for value, (low, _) in zip(values, magnitudes, strict=True))
     outer = max(high for _, high in magnitudes)
     if inner >= 0.0:
         return (inner, outer) if sign > 0.0 else (-outer, -inner)
     hull = min(low for low, _ in ends), max(high for _, high in ends)
-    own = (inner, outer) if sign > 0.0 else (-outer, -inner)
-    return min(hull[0], own[0]), max(hull[1], own[1])
+    interval = (inner, outer) if sign > 0.0 else (-outer, -inner)
+    return min(hull[0], interval[0]), max(hull[1], interval[1])
 
 
-def _ends(one: FigureValue) -> tuple[float, float]:
+def _ends(figure: FigureValue) -> tuple[float, float]:
     """The 95 % interval of one axis; that of a normal law where none is stated."""
-    reach = REACH_95 * one.uncertainty
-    low = one.low if not np.isnan(one.low) else one.value - reach
-    high = one.high if not np.isnan(one.high) else one.value + reach
+    reach = REACH_95 * figure.uncertainty
+    low = figure.low if not np.isnan(figure.low) else figure.value - reach
+    high = figure.high if not np.isnan(figure.high) else figure.value + reach
     return low, high
 
 
@@ -198,10 +198,10 @@ def diagnosis_texts(
     verdict = "adequate" if diagnosis.adequate else "not adequate"
     text = f"{model} is {verdict} ({probability(p_value(diagnosis.fit))}), rms residual {before} {unit}"
     out = [(subject, text + where)]
-    for one in diagnosis.classes:
-        effect, *rivals = one.effects
+    for missed in diagnosis.classes:
+        effect, *rivals = missed.effects
         alike = f"; {by} do not separate it from {', '.join(rivals)}" if rivals else ""
-        out.append(("missing effect", f"{effect}: {size(effect)}, {probability(one.p_value)}{alike}"))
+        out.append(("missing effect", f"{effect}: {size(effect)}, {probability(missed.p_value)}{alike}"))
     if diagnosis.classes:
         held = " → ".join(f"{value:.2f}" for value in diagnosis.left_out)
         text = f"rms residual {before} → {after} {unit}; {left_out} left out, in standard uncertainties: {held}"

@@ -116,7 +116,7 @@ class Taken(NamedTuple):
     record: ProcedureRecord
     unit: str
     reading: Mapping[str, Any]
-    own: UnitRecord
+    samples: UnitRecord
 
 
 def taken(records: Records) -> Iterator[Taken]:
@@ -165,11 +165,11 @@ def procedure_record(
     for table in samples:
         output, time = table[list(AXES)].to_numpy(dtype=float), table["time_s"].to_numpy(dtype=float)
         for unit, rows in table.groupby("unit", sort=False).indices.items():
-            own = output[rows] if unit == REFERENCE else output[rows, :axes]
-            parts.setdefault(str(unit), []).append((time[rows], own))
+            channels = output[rows] if unit == REFERENCE else output[rows, :axes]
+            parts.setdefault(str(unit), []).append((time[rows], channels))
     joined = {
-        unit: UnitRecord(np.concatenate([t for t, _ in own]), np.concatenate([o for _, o in own]))
-        for unit, own in parts.items()
+        unit: UnitRecord(np.concatenate([t for t, _ in pieces]), np.concatenate([o for _, o in pieces]))
+        for unit, pieces in parts.items()
     }
     return ProcedureRecord(number, step, readings, joined)
 
@@ -188,7 +188,7 @@ def numbers(rows: pd.DataFrame, *names: str) -> list[Array]:
 def point_rows(**columns: Any) -> list[dict[str, Any]]:
     """Rows of points from columns in their order; what is one value, not a sequence, is that of every row."""
     count = max(np.size(column) for column in columns.values())
-    spread = {name: [one] * count if np.ndim(one) == 0 else one for name, one in columns.items()}
+    spread = {name: [column] * count if np.ndim(column) == 0 else column for name, column in columns.items()}
     return [dict(zip(spread, row, strict=True)) for row in zip(*spread.values(), strict=True)]
 
 

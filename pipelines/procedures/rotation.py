@@ -130,7 +130,7 @@ class Rotation(InG, Evaluated):
 
     def reduce(self, part: RotationPart, records: Records, device: Device) -> pd.DataFrame:
         """Means over ten degrees of every sweep, and at rest, with what the encoder says of them."""
-        each = groupby(taken(records), key=lambda one: one.number)
+        each = groupby(taken(records), key=lambda measured: measured.number)
         return point_table(
             row
             for number, units in each
@@ -179,15 +179,15 @@ class Rotation(InG, Evaluated):
         plots: list[Plot] = []
         for plane in part.planes:
             rows = points[points["axis"] == data.letters[0]].sort_values("time_s")
-            own = (rows["series"] == plane).to_numpy(dtype=bool) & data.points.turning
-            angle = np.degrees(data.points.angle[own])
+            turning = (rows["series"] == plane).to_numpy(dtype=bool) & data.points.turning
+            angle = np.degrees(data.points.angle[turning])
             order = np.argsort(angle)
             traces = [level(np.array([-180.0, 180.0]), 0.0)]
             for k, axis in enumerate(data.letters):
-                role, left = cast("Role", axis), (fit.residuals + curve)[own, k]
+                role, left = cast("Role", axis), (fit.residuals + curve)[turning, k]
                 traces += [
                     Trace(f"axis {axis}", angle, MICRO * left, role=role, size=4.0),
-                    Trace(f"effects on {axis}", angle[order], MICRO * curve[own, k][order], "line", role),
+                    Trace(f"effects on {axis}", angle[order], MICRO * curve[turning, k][order], "line", role),
                 ]
             plots.append(
                 Plot(f"plane {plane}", PlotAxis("angle / °", step=45.0), PlotAxis("residual / µg"), tuple(traces))
@@ -195,8 +195,8 @@ class Rotation(InG, Evaluated):
         return Chart(self.title, tuple(plots))
 
 
-def _figure(name: str, axis: str, one: tuple[float, float], factor: float, nominal: float = 0.0) -> FigureValue:
-    return FigureValue(name, axis, factor * (one[0] - nominal), factor * one[1])
+def _figure(name: str, axis: str, estimate: tuple[float, float], factor: float, nominal: float = 0.0) -> FigureValue:
+    return FigureValue(name, axis, factor * (estimate[0] - nominal), factor * estimate[1])
 
 
 def _misalignment(fit: RotationFit, axis: str, other: str) -> FigureValue:
@@ -240,8 +240,8 @@ def _radius(fit: RotationFit) -> FigureValue:
 
 
 def _coefficients(fit: RotationFit, letters: tuple[str, ...]) -> Texts:
-    def stated(one: tuple[float, float], factor: float, nominal: float = 0.0) -> str:
-        return with_uncertainty(factor * (one[0] - nominal), 2.0 * factor * one[1])
+    def stated(estimate: tuple[float, float], factor: float, nominal: float = 0.0) -> str:
+        return with_uncertainty(factor * (estimate[0] - nominal), 2.0 * factor * estimate[1])
 
     out: list[tuple[str, str]] = []
     for a in letters:
@@ -252,11 +252,11 @@ def _coefficients(fit: RotationFit, letters: tuple[str, ...]) -> Texts:
         parts += [f"to {b} {stated(fit.of(f'matrix_{a}{b}'), MILLI)} mg/g" for b in AXES if b != a]
         for effect in fit.effects:
             if f"{effect}_{a}" in fit.names:
-                one = EFFECTS[effect]
-                parts.append(f"{effect} {stated(fit.of(f'{effect}_{a}'), one.factor)} {one.unit}")
+                shown = EFFECTS[effect]
+                parts.append(f"{effect} {stated(fit.of(f'{effect}_{a}'), shown.factor)} {shown.unit}")
         out.append((f"coefficients of axis {a}", f"{'; '.join(parts)} (k = 2)"))
-    place = ", ".join(f"{a} {stated(fit.of(f'place_{a}'), MILLI)} mm" for a in _felt(fit))
-    return [*out, ("place of the proof masses in the fixture", f"{place} (k = 2)")]
+    places = ", ".join(f"{a} {stated(fit.of(f'place_{a}'), MILLI)} mm" for a in _felt(fit))
+    return [*out, ("place of the proof masses in the fixture", f"{places} (k = 2)")]
 
 
 def _drive(part: RotationPart, rows: pd.DataFrame) -> Texts:
@@ -286,9 +286,9 @@ def _open(part: RotationPart) -> Texts:
 
 def _diagnosis(diagnosis: RotationDiagnosis) -> Texts:
     def size(name: str) -> str:
-        fit, one = diagnosis.extended, EFFECTS[name]
-        found = max((fit.of(own) for own in fit.of_effect(name)), key=lambda pair: abs(pair[0]))
-        return f"up to {with_uncertainty(one.factor * found[0], 2.0 * one.factor * found[1])} {one.unit} (k = 2)"
+        fit, shown = diagnosis.extended, EFFECTS[name]
+        found = max((fit.of(term) for term in fit.of_effect(name)), key=lambda pair: abs(pair[0]))
+        return f"up to {with_uncertainty(shown.factor * found[0], 2.0 * shown.factor * found[1])} {shown.unit} (k = 2)"
 
     rms = (f"{MICRO * diagnosis.error_g:.3g}", f"{MICRO * diagnosis.extended_g:.3g}", "µg")
     first = ("bias", "scale", "misalignment", "delay", "place")

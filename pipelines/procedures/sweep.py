@@ -96,11 +96,11 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         ]
         steps = list(dwells)
         for soak, at in enumerate(part.other_temperatures_C, start=1):
-            steps += [replace(one, name=f"{at:g} °C, {one.name}", temperature_C=at, soak=soak) for one in dwells]
+            steps += [replace(dwell, name=f"{at:g} °C, {dwell.name}", temperature_C=at, soak=soak) for dwell in dwells]
         for pressure in part.pressures_hPa:
             steps.append(leg_step(f"{pressure:g} hPa", _leg(part, pressure), steps[-1].soak + 1))
             soak = steps[-1].soak + 1
-            steps += [replace(one, name=f"{pressure:g} hPa, {one.name}", soak=soak) for one in dwells]
+            steps += [replace(dwell, name=f"{pressure:g} hPa, {dwell.name}", soak=soak) for dwell in dwells]
         if part.pressures_hPa:
             steps.append(leg_step("room", _leg(part, AMBIENT_HPA), steps[-1].soak + 1))
         return steps
@@ -130,9 +130,9 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         """The dwell on the exciter."""
         if step.role == ROLE:
             return expose(equipment, step, slots)
-        one = step.setting
+        setting = step.setting
         seconds = step.lasting_s or 0.0
-        return equipment.sine(one["frequency_hz"], one["level_g"], int(one["axis"]), seconds, slots)
+        return equipment.sine(setting["frequency_hz"], setting["level_g"], int(setting["axis"]), seconds, slots)
 
     def setting_of(self, part: SweepPart, reference: UnitRecord) -> dict[str, float]:
         """Frequency and level of a dwell, from the largest tone of the reference; no frequency where there is no single tone."""
@@ -159,15 +159,17 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         broadband = {id(r) for r in records if np.isnan(r.step.setting["frequency_hz"])}
         clocks = clocks_of([r for r in records if id(r) not in broadband], axis)
         rows: list[dict[str, Any]] = []
-        for one in taken(records):
-            clock, pair = clocks.get(one.unit, (0.0, 0.0)), (one.record.samples[REFERENCE], one.own)
-            if id(one.record) in broadband:
-                points = response_bands(part, one.number, pair, axis, device)
+        for measured in taken(records):
+            clock, pair = clocks.get(measured.unit, (0.0, 0.0)), (measured.record.samples[REFERENCE], measured.samples)
+            if id(measured.record) in broadband:
+                points = response_bands(part, measured.number, pair, axis, device)
             else:
-                points = [response_point(part, one.number, one.record.step.setting, pair, axis, clock, device)]
-            about = {"unit": one.unit, "temperature_C": float(one.reading["unit_C"])}
+                points = [
+                    response_point(part, measured.number, measured.record.step.setting, pair, axis, clock, device)
+                ]
+            about = {"unit": measured.unit, "temperature_C": float(measured.reading["unit_C"])}
             if part.pressures_hPa:
-                about["pressure_hPa"] = pressures[one.record.number]
+                about["pressure_hPa"] = pressures[measured.record.number]
             rows += [point | about for point in points]
         return point_table(rows)
 

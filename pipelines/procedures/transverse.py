@@ -87,9 +87,9 @@ class TransverseTest(InG, OnEquipment, Compares):
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """The dwell on the exciter."""
-        one = step.setting
-        level, angle, seconds = one["level_g"], one["angle_deg"], step.lasting_s or 0.0
-        return equipment.sine_across(one["frequency_hz"], level, int(one["axis"]), angle, seconds, slots)
+        setting = step.setting
+        level, angle, seconds = setting["level_g"], setting["angle_deg"], step.lasting_s or 0.0
+        return equipment.sine_across(setting["frequency_hz"], level, int(setting["axis"]), angle, seconds, slots)
 
     def missing_axes(self, part: TransversePart, letters: Sequence[str]) -> list[str]:
         """The response across is that of the other axes."""
@@ -100,10 +100,10 @@ class TransverseTest(InG, OnEquipment, Compares):
         rows: list[dict[str, Any]] = []
         units = list(dict.fromkeys(str(unit) for record in records for unit in record.readings["unit"]))
         for unit in units:
-            own = [(k, record) for k, record in enumerate(records) if unit in record.samples]
-            tones = [_tones(part, record, record.samples[unit], scale_of(part, device, unit)) for _, record in own]
+            recorded = [(k, record) for k, record in enumerate(records) if unit in record.samples]
+            tones = [_tones(part, record, record.samples[unit], scale_of(part, device, unit)) for _, record in recorded]
             turns = _turns(tones)
-            for (k, record), (drive, answer, noise, whole), turn in zip(own, tones, turns, strict=True):
+            for (k, record), (drive, answer, noise, whole), turn in zip(recorded, tones, turns, strict=True):
                 rows.append(_point(part, k, record, (drive, answer, noise), turn, whole=whole) | {"unit": unit})
         return point_table(rows)
 
@@ -128,8 +128,8 @@ class TransverseTest(InG, OnEquipment, Compares):
         at: dict[str, Any] = {"setting": part.frequency_hz, "dof": float(fit.dof) or float("inf")}
         scale = without(figure.uncertainty, noise, 1e-2 * part.reference_percent * figure.value)
         terms = by_share(figure.value, ("reference", "drift", "amplitude"))
-        own = {"noise": noise, "nominal_scale": scale}
-        results = [ComparedResult("transverse_sensitivity", part.axis, "%", figure.value, own, terms, **at)]
+        noises = {"noise": noise, "nominal_scale": scale}
+        results = [ComparedResult("transverse_sensitivity", part.axis, "%", figure.value, noises, terms, **at)]
         if fit.direction_error_deg < 180.0:
             angle = {"noise": fit.direction_error_deg}
             results.append(
@@ -167,7 +167,7 @@ def fitted(rows: pd.DataFrame) -> Transverse:
 
 
 def _tones(
-    part: TransversePart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray
+    part: TransversePart, record: ProcedureRecord, channels: UnitRecord, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
     """Tones (3,) of the reference and of the unit in g, standard uncertainties of their difference (3,), whether it responds.
 
@@ -175,17 +175,17 @@ def _tones(
     """
     reference = record.samples[REFERENCE]
     drive = fit_tone(reference.output, reference.rate_hz, part.frequency_hz, harmonics=HARMONICS)
-    output = own.output / scale
+    output = channels.output / scale
     alive = bool(np.all(np.isfinite(output)) and np.ptp(output[:, AXES.index(part.axis)]) > 0.0)
     frequency = part.frequency_hz
     seen = False
     if alive:
         strongest = int(np.argmax(output.std(axis=0)))
-        tone = fit_tone_and_frequency(output[:, [strongest]], own.rate_hz, part.frequency_hz)
+        tone = fit_tone_and_frequency(output[:, [strongest]], channels.rate_hz, part.frequency_hz)
         seen = abs(tone.value[0]) > SILENT * tone.amplitude_error[0]
         frequency = tone.frequency if seen else frequency
     shown = output if alive else np.zeros_like(output)
-    answer = fit_tone(shown, own.rate_hz, frequency, harmonics=HARMONICS)
+    answer = fit_tone(shown, channels.rate_hz, frequency, harmonics=HARMONICS)
     # the motion along the axis that the reference measures is subtracted, with its noise
     return drive.value, answer.value, np.hypot(answer.amplitude_error, drive.amplitude_error), alive and seen
 
@@ -218,8 +218,8 @@ def _point(
     ratio = float(np.real(answer[axis] * turn / driven) - np.real(drive[axis] / driven))
     # noise of the phase moves what is subtracted by the motion along the axis that is in quadrature
     quadrature = abs(np.imag(drive[axis] / driven)) * float(np.hypot(noise[first], noise[second])) / np.sqrt(2.0)
-    own = float(np.hypot(noise[axis], quadrature)) / abs(driven)
-    error = float(np.hypot(own, 1e-6 * part.repeatability_ppm))
+    noise_u = float(np.hypot(noise[axis], quadrature)) / abs(driven)
+    error = float(np.hypot(noise_u, 1e-6 * part.repeatability_ppm))
     return {
         "axis": part.axis,
         "series": "across",
