@@ -79,10 +79,10 @@ def gaps(measurement: Measured, faults: Sequence[Fault], left_out: Collection[st
     """
     faulty = {fault.unit for fault in faults}
     parts: list[str] = []
-    for place, unit in enumerate(measurement.units):
-        missing = (int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, place))
+    for index, unit in enumerate(measurement.units):
+        missing = (int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, index))
         numbers = [n for n in missing if f"{unit}:{n}" not in left_out]
-        if numbers and place not in faulty:
+        if numbers and index not in faulty:
             shown = ", ".join(map(str, numbers[:_SHOWN])) + (", …" if len(numbers) > _SHOWN else "")
             parts.append(f"{unit} {len(numbers)} ({shown})")
     if not parts:
