@@ -200,7 +200,7 @@ def _entering(scope: Scope, settings: WorkbenchSettings) -> RedirectResponse | P
         return PlainTextResponse(
             "workbench: this is not the token of this service; use the address that it printed", 403
         )
-    rest = urlencode([one for one in query if one[0] != "token"])
+    rest = urlencode([pair for pair in query if pair[0] != "token"])
     headers = Headers(scope=scope)
     bound = _bound(headers, settings)
     value = session(settings.token, bound)

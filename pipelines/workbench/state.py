@@ -79,7 +79,7 @@ class PageState(BaseModel):
         for name, about in type(self).model_fields.items():
             value = getattr(new, name)
             if value != about.default:
-                pairs += [(name, str(one)) for one in (value if isinstance(value, tuple) else (value,))]
+                pairs += [(name, str(item)) for item in (value if isinstance(value, tuple) else (value,))]
         return urlencode(pairs)
 
     def address(self, **changes: Any) -> str:

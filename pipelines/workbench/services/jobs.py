@@ -86,8 +86,8 @@ def _serve(pipe: Connection) -> None:
 class Jobs:
     """The table of jobs."""
 
-    def __init__(self, place: Path, workers: int) -> None:
-        self._place, self._workers = place, max(1, workers)
+    def __init__(self, path: Path, workers: int) -> None:
+        self._path, self._workers = path, max(1, workers)
         self._lock = threading.RLock()
         self._jobs: OrderedDict[str, BackgroundJob] = OrderedDict()
         self._results: OrderedDict[str, Any] = OrderedDict()
@@ -227,18 +227,20 @@ class Jobs:
         """Store the list of jobs, so that the next server can state the interrupted ones."""
         with suppress(ArchiveUnusable, OSError):
             content = [job.document() for job in list(self._jobs.values())[-20:]]
-            self._place.parent.mkdir(parents=True, exist_ok=True)
-            files.publish(self._place, files.json_bytes({"jobs": content}), "jobs", files.ELSEWHERE)
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            files.publish(self._path, files.json_bytes({"jobs": content}), "jobs", files.ELSEWHERE)
 
     def _remember(self) -> None:
         """The unfinished jobs of an earlier server process."""
-        if not self._place.is_file():
+        if not self._path.is_file():
             return
         with suppress(ArchiveUnusable, KeyError, TypeError):
-            for one in files.read_json(self._place)["jobs"]:
-                if one["state"] in {"waiting", "running"}:
+            for stored in files.read_json(self._path)["jobs"]:
+                if stored["state"] in {"waiting", "running"}:
                     note = "the server ended before it was done; start it again"
-                    job = BackgroundJob(str(one["id"]), str(one["kind"]), str(one["title"]), "interrupted", note=note)
+                    job = BackgroundJob(
+                        str(stored["id"]), str(stored["kind"]), str(stored["title"]), "interrupted", note=note
+                    )
                     self._jobs[job.id] = job
 
 

@@ -96,7 +96,7 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
             report_progress(3, steps, "fitting the model before the last step")
             before = residuals_with(condense(dwells), history, model[:-1], units)
     state = made.measured.state
-    known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
+    known = {name: quantity for name, quantity in formula_names().items() if getattr(state, quantity[0]) is not None}
     names = {name: meaning for name, (_, _, meaning) in known.items() if not meaning.startswith("the same")}
     names |= dict.fromkeys(covariates(dwells), "recorded column")
     return Diagnosed(made.document, table, ladder, before, names, views)
@@ -110,12 +110,12 @@ def coefficients(request: Mapping[str, Any], report_progress: ReportProgress) ->
     from pipelines.tables.frames import rows_of
 
     tables: list[pd.DataFrame] = []
-    for number, one in enumerate(request["both"]):
+    for number, side in enumerate(request["both"]):
         report_progress(number, len(request["both"]), "fitting")
-        dwells, history, judged = _inputs(one, "two models")
+        dwells, history, judged = _inputs(side, "two models")
         told = {"kind": "dwell", "out_unit": "g"}  # what a file that lacks them means
         whole = dwells.assign(**{name: text for name, text in told.items() if name not in dwells})
-        fitted, _, _ = fit_in_memory(LotTables(whole, history), [*(judged or ()), *one["added"]])
+        fitted, _, _ = fit_in_memory(LotTables(whole, history), [*(judged or ()), *side["added"]])
         tables.append(fitted["coefficients"])
     return rows_of(changed(tables[0], tables[1], COEFFICIENT, "standard_error"))
 
@@ -238,19 +238,23 @@ def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
         charts["yield"] = pictures.yield_chart(months)
     if archive_audit.due.row.size:
         charts["due"] = pictures.due_chart(archive_audit)
-    plainest = sorted(archive_audit.charts, key=lambda one: one.p_value)[:MOST_CHARTS]
-    moved = sorted((*archive_audit.stations, *archive_audit.slots), key=lambda one: -len(one.changes))[:MOST_CHARTS]
-    charts |= {f"control-{number}": pictures.control_chart(one) for number, one in enumerate(plainest)}
-    charts |= {f"station-{number}": pictures.series_chart(one) for number, one in enumerate(moved)}
+    plainest = sorted(archive_audit.charts, key=lambda chart: chart.p_value)[:MOST_CHARTS]
+    moved = sorted((*archive_audit.stations, *archive_audit.slots), key=lambda series: -len(series.changes))[
+        :MOST_CHARTS
+    ]
+    charts |= {f"control-{number}": pictures.control_chart(chart) for number, chart in enumerate(plainest)}
+    charts |= {f"station-{number}": pictures.series_chart(series) for number, series in enumerate(moved)}
     drifts = enumerate(furthest(archive_audit, MOST_CHARTS))
-    charts |= {f"drift-{number}": pictures.drift_chart(archive_audit, one) for number, one in drifts}
+    charts |= {f"drift-{number}": pictures.drift_chart(archive_audit, drift) for number, drift in drifts}
     listed = findings(archive_audit)
-    evidence = {address_of(one): pictures.evidence_chart(archive_audit, one) for one in listed[:MOST_EVIDENCE]}
+    evidence = {
+        address_of(finding): pictures.evidence_chart(archive_audit, finding) for finding in listed[:MOST_EVIDENCE]
+    }
     return {
         "document": document(archive_audit, listed, request["archive"]),
         "charts": charts,
         "evidence": {name: chart for name, chart in evidence.items() if chart is not None},
-        "addresses": [address_of(one) for one in listed],
+        "addresses": [address_of(finding) for finding in listed],
     }
 
 
