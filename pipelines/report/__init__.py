@@ -83,7 +83,7 @@ def keep_report(
     if certificates:
         parameters = {
             **parameters,
-            "certificates": {unit: one.key_values() for unit, one in sorted(certificates.items())},
+            "certificates": {unit: calibration.key_values() for unit, calibration in sorted(certificates.items())},
         }
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):

@@ -71,15 +71,15 @@ def pose_chart(
     models : name, and residuals (axes, n), µg; NaN where a dwell is missing
     pick : selection by a click on the point of a dwell
     """
-    poses, first, place = np.unique(np.round(force, 2) + 0.0, axis=0, return_index=True, return_inverse=True)
+    poses, first, pose = np.unique(np.round(force, 2) + 0.0, axis=0, return_index=True, return_inverse=True)
     x, y = project(poses)
     plots: list[Plot] = []
     everything: list[Array] = []
     for label, residual in models:
         for axis, values in zip(axes, residual, strict=True):
             finite = np.isfinite(values)
-            there = np.unique(place.reshape(-1)[finite])
-            means = np.array([values[finite & (place.reshape(-1) == k)].mean() for k in there])
+            there = np.unique(pose.reshape(-1)[finite])
+            means = np.array([values[finite & (pose.reshape(-1) == k)].mean() for k in there])
             texts = tuple(
                 f"f = ({p[0]:+.2f}, {p[1]:+.2f}, {p[2]:+.2f}) g: {mean:.3g} µg"
                 for p, mean in zip(poses[there], means, strict=True)

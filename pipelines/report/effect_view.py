@@ -130,7 +130,11 @@ def _view(
     fallen = np.nanmean(before**2, axis=2) - np.nanmean(after**2, axis=2)
     shown, axis = (int(k) for k in np.unravel_index(int(np.argmax(fallen)), fallen.shape))
     quantity = next(
-        (one for one in _quantities(problem, term, axis) if followed(one.values[shown], adds[shown, axis]) > FOLLOWED),
+        (
+            quantity
+            for quantity in _quantities(problem, term, axis)
+            if followed(quantity.values[shown], adds[shown, axis]) > FOLLOWED
+        ),
         DriverValues("", f"{CONTRIBUTION} {term.effect.id} / µg", adds[:, axis]),
     )
     return EffectView(
@@ -144,8 +148,10 @@ def _plain(diagnosis: Diagnosis, units: tuple[str, ...], residual: Array, floor:
     problem = diagnosis.problem
     sizes = np.nanmean(residual**2, axis=2)
     shown, axis = (int(k) for k in np.unravel_index(int(np.argmax(sizes)), sizes.shape))
-    known = {one.name: one for one in recorded_quantities(problem)}
-    follows = [one.driver for one in (*([diagnosis.unexplained] if diagnosis.unexplained else []), *diagnosis.where)]
+    known = {quantity.name: quantity for quantity in recorded_quantities(problem)}
+    follows = [
+        misfit.driver for misfit in (*([diagnosis.unexplained] if diagnosis.unexplained else []), *diagnosis.where)
+    ]
     forces = [] if problem.lot.radial else [_forces(problem, axis)[0]]
     quantity = next(
         (_of_axis(known[name], axis) for name in follows if name in known),
@@ -178,7 +184,7 @@ def _of_axis(driver: DriverValues, axis: int) -> DriverValues:
 
 def _forces(problem: Problem, axis: int) -> list[DriverValues]:
     """The specific force along an axis of the lot, then along the others; (units, n)."""
-    own = problem.axes[axis]
+    along = problem.axes[axis]
     shape = (problem.lot.output.shape[0], problem.n)
     return [
         DriverValues(
@@ -186,7 +192,7 @@ def _forces(problem: Problem, axis: int) -> list[DriverValues]:
             f"specific force along {'xyz'[k]} / g",
             np.broadcast_to(problem.lot.state.force[..., k], shape),
         )
-        for k in (own, *(k for k in range(3) if k != own))
+        for k in (along, *(k for k in range(3) if k != along))
     ]
 
 
@@ -199,14 +205,14 @@ def _quantities(problem: Problem, term: Term, axis: int) -> Iterator[DriverValue
         return
     columns = {row.attribute: row.column for row in RECORDED}
     names = drivers_of(state, effect)
-    own = [known[columns[name]] for name in sorted(names) if columns.get(name) in known]
+    quantities = [known[columns[name]] for name in sorted(names) if columns.get(name) in known]
     if not names:  # of a recorded column that has no place in the state
-        own = [known[effect.id]] if effect.id in known else list(known.values())
+        quantities = [known[effect.id]] if effect.id in known else list(known.values())
     forces = [] if problem.lot.radial or "force" not in names else _forces(problem, axis)
-    yield from (*forces, *own)
-    for one, other in combinations_with_replacement([*forces, *own], 2):
-        yield DriverValues("", _product(one, other), _about(one) * _about(other))
-    for force, other in product(forces, own):
+    yield from (*forces, *quantities)
+    for first, other in combinations_with_replacement([*forces, *quantities], 2):
+        yield DriverValues("", _product(first, other), _about(first) * _about(other))
+    for force, other in product(forces, quantities):
         label, _, unit = other.label.partition(" / ")
         square = f"{force.name}·({label} less its mean)² / g·{unit}²"
         yield DriverValues("", square, force.values * _about(other) ** 2)

@@ -156,11 +156,11 @@ def quantities_of_added(diagnosis: Diagnosis) -> tuple[list[DriverValues], list[
     return series, [columns[name] for _, names in drivers for name in sorted(names) if name in columns]
 
 
-def _alike(one: Array, other: Array) -> bool:
+def _alike(driver: Array, other: Array) -> bool:
     """Whether two drivers are equivalent, as elapsed time and time since power-on often are."""
-    if one.shape != other.shape:
+    if driver.shape != other.shape:
         return False
-    return bool(abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) > _ALIKE)
+    return bool(abs(np.corrcoef(driver.ravel(), other.ravel())[0, 1]) > _ALIKE)
 
 
 def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[str]:

@@ -16,8 +16,8 @@ from pipelines.stages.figures import figure_label
 def _environment() -> Environment:
     loader = FunctionLoader(lambda part: (files("pipelines.report") / part).read_text(encoding="utf-8"))
     made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    own: dict[str, Any] = {"plain_name": plain_name, "figure_label": figure_label}
-    made.globals.update(own)
+    names: dict[str, Any] = {"plain_name": plain_name, "figure_label": figure_label}
+    made.globals.update(names)
     return made
 
 

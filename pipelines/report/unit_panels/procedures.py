@@ -38,7 +38,7 @@ def render(unit: UnitContext) -> str | None:
     tables = unit.tables
     if not parts or "procedure_figures" not in tables:
         return None
-    shown = [one for number in range(len(parts)) if (one := _procedure(unit, number, parts[number])) is not None]
+    shown = [panel for number in range(len(parts)) if (panel := _procedure(unit, number, parts[number])) is not None]
     return fill(TEMPLATE, procedures=shown, coverage=f"{unit.report.coverage:g}") if shown else None
 
 
