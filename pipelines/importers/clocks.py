@@ -74,16 +74,16 @@ def recognised(numbers: Array, name: str, stated: str = "") -> Recognised:
     name : of the column; `time_ms` states a unit.
     stated : unit that the file states elsewhere.
     """
-    own = unit_stated(stated)
-    if own:
-        return Recognised(own, f"the file states {stated}", (own,))
+    unit = unit_stated(stated)
+    if unit:
+        return Recognised(unit, f"the file states {stated}", (unit,))
     epoch = _epoch(numbers)
     if epoch:
         return Recognised(epoch, f"Unix time, in {epoch}", (epoch,))
     match = _NAMED.search(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name))
-    own = unit_stated(match[1]) if match else ""
-    if own and match and match[0].strip() != name.strip():
-        return Recognised(own, f"the name '{shown(name)}'", (own,))
+    unit = unit_stated(match[1]) if match else ""
+    if unit and match and match[0].strip() != name.strip():
+        return Recognised(unit, f"the name '{shown(name)}'", (unit,))
     return _by_steps(numbers)
 
 
@@ -135,7 +135,9 @@ def stamps(column: pd.Series, where: str) -> Array:
     plain = _read(text, _FORMATS, where)
     if plain is not None:
         return plain
-    candidates = [one for forms in (_DAY_FIRST, _MONTH_FIRST) if (one := _read(text, forms, where)) is not None]
+    candidates = [
+        instants for forms in (_DAY_FIRST, _MONTH_FIRST) if (instants := _read(text, forms, where)) is not None
+    ]
     if len(candidates) == 2 and not np.allclose(candidates[0], candidates[1]):
         raise DataRejected(
             f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month are ambiguous, and the date changes; "

@@ -44,7 +44,7 @@ class Content:
 
 
 _ENDINGS = {
-    **{one: one for one in ("s", "ms", "us", "µs", "ns", "g", "mg", "V", "mV", "LSB")},
+    **{unit: unit for unit in ("s", "ms", "us", "µs", "ns", "g", "mg", "V", "mV", "LSB")},
     **dict.fromkeys(("m_s2", "m_s_2", "mps2"), "m/s^2"),
 }
 
@@ -91,7 +91,7 @@ def chosen(groups: Sequence[tuple[str, int]], group: str, where: str, missing: s
         return group
     if len(names) == 1:
         return names[0]
-    likely = sorted(groups, key=lambda one: not any(word in one[0].lower() for word in INERTIAL))
+    likely = sorted(groups, key=lambda pair: not any(word in pair[0].lower() for word in INERTIAL))
     listed = ", ".join(f"'{shown(name)}' ({count} samples)" for name, count in likely[:_MOST_LISTED])
     more = "" if len(groups) <= _MOST_LISTED else f" and {len(groups) - _MOST_LISTED} more"
     raise WrongUse(

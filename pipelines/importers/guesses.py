@@ -91,7 +91,7 @@ def guesses(content: Content) -> Guesses:
     """Guesses of what the columns of a file mean, by names, units and numbers."""
     table = content.table
     guessed: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
-    numeric = {str(name): one for name in table.columns if (one := _numbers(table[name])) is not None}
+    numeric = {str(name): numbers for name in table.columns if (numbers := _numbers(table[name])) is not None}
     inside = _named(table, numeric, guessed)
     _time(table, numeric, guessed, inside)
     found = triads.Triad() if _single_axis(numeric, guessed) else _axes(content, numeric, guessed)
@@ -121,7 +121,7 @@ def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Gu
 def _of_dwells(numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> None:
     """Note what is read so in a table of dwells alone: the number of samples, the force, and the numbers of the dwells."""
     if not set(FORCE_COLUMNS) & {guess.meaning for guess in guessed.values()}:
-        acting = triads.references({name: one for name, one in numeric.items() if not guessed[name].meaning})
+        acting = triads.references({name: numbers for name, numbers in numeric.items() if not guessed[name].meaning})
         for force, name in zip(FORCE_COLUMNS, acting, strict=False):
             guessed[name] = Guess(force, "its name, and its size is that of gravity")
     for name in named_columns.OF_DWELLS:

@@ -174,7 +174,7 @@ def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: floa
     """What a file with a time and two columns, of which one is named as the reference, may be; None for others."""
     if rate_hz is None or rate_hz < _SLOWEST_HZ:
         return None
-    other = [name for name, one in guessed.columns.items() if one.meaning != "time"]
+    other = [name for name, guess in guessed.columns.items() if guess.meaning != "time"]
     free = [name for name in other if content.table[name].dtype.kind in "fi"]
     driven = [name for name in free if _REFERENCE.search(name)]
     if len(free) != 2 or len(driven) != 1:

@@ -40,7 +40,7 @@ def send(sink: Any, value: Any) -> None:
     arrays: list[pickle.PickleBuffer] = []
     head = pickle.dumps(value, 5, buffer_callback=arrays.append)
     pieces: list[Any] = [head, *(array.raw() for array in arrays)]
-    sink.write(struct.pack(f">{len(pieces) + 1}Q", len(pieces), *(len(memoryview(one)) for one in pieces)))
+    sink.write(struct.pack(f">{len(pieces) + 1}Q", len(pieces), *(len(memoryview(piece)) for piece in pieces)))
     for piece in pieces:
         sink.write(piece)
     sink.flush()

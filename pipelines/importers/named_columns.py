@@ -31,7 +31,7 @@ def serials(table: pd.DataFrame) -> str:
     for name in (str(column) for column in table.columns if _SERIAL.match(str(column))):
         distinct = table[name].unique()
         few = len(distinct) == 1 or 2 * len(distinct) <= len(table)
-        if few and table[name].notna().all() and not all(output_unit(str(one)) for one in distinct):
+        if few and table[name].notna().all() and not all(output_unit(str(value)) for value in distinct):
             return name
     return ""
 

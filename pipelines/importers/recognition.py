@@ -58,8 +58,8 @@ class Recognition:
         if self.guessed.dwells:
             named = self.guessed.column("dwell")
             whole = bool(named) and len(self.content.table) == len(self.output)
-            own = [f"dwell {k}" for k in range(len(self.output))]
-            labels = self.content.table[named].astype(str).tolist() if whole else own
+            numbered = [f"dwell {k}" for k in range(len(self.output))]
+            labels = self.content.table[named].astype(str).tolist() if whole else numbered
             return self._proposal(self.keys, self.output, labels)
         time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
         stops = self.stops or _stops(self.output, time, self.guessed.output.meaning, self.joints)
@@ -131,14 +131,14 @@ def of_content(
     if time is not None:
         whole &= np.isfinite(time)
     kept = None if output is None else output[whole]
-    own = None if time is None else time[whole]
-    steps = np.diff(own) if own is not None else np.zeros(0)
+    clock = None if time is None else time[whole]
+    steps = np.diff(clock) if clock is not None else np.zeros(0)
     gaps = int(np.count_nonzero(steps > gap_limit(steps)))
     faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
     joints = tuple(np.searchsorted(np.flatnonzero(whole), breaks).tolist())
     stops = (
-        _stops(kept, own, guessed.output.meaning, joints)
-        if kept is not None and own is not None and not guessed.dwells
+        _stops(kept, clock, guessed.output.meaning, joints)
+        if kept is not None and clock is not None and not guessed.dwells
         else None
     )
     named = guessed.column("dwell")
@@ -154,7 +154,7 @@ def of_content(
     keys |= {"faulty": "leave-out"} if faults else {}
     open_ += _open(guessed, kept)
     return Recognition(
-        tuple(paths), content, source, guessed, False, own, kept, gaps, _rate(own), stops, faults, tuple(open_), keys, labels,
+        tuple(paths), content, source, guessed, False, clock, kept, gaps, _rate(clock), stops, faults, tuple(open_), keys, labels,
         joints,
     )  # fmt: skip
 

@@ -151,7 +151,7 @@ def _with_numbers(
         return kept, columns, ()
     first = content.row(int(np.flatnonzero(~whole)[0]))
     remark = f"{count - kept.size} of {count} rows without a number left out, the first is {first}; dwells end there"
-    return kept, {name: one.iloc[kept].reset_index(drop=True) for name, one in columns.items()}, (remark,)
+    return kept, {name: column.iloc[kept].reset_index(drop=True) for name, column in columns.items()}, (remark,)
 
 
 def _twice(time: Array, raw: Array) -> tuple[str, ...]:
@@ -168,8 +168,8 @@ def _twice(time: Array, raw: Array) -> tuple[str, ...]:
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
     if "unit" in columns:
         serials = ["" if pd.isna(value) else values.text(value) for value in columns["unit"].tolist()]
-        place = f"{where}: column '{columns['unit'].name}'"
-        refuse_unusable_serials(dict.fromkeys(serials), place, "correct it in the file")
+        subject = f"{where}: column '{columns['unit'].name}'"
+        refuse_unusable_serials(dict.fromkeys(serials), subject, "correct it in the file")
         return serials
     if not mapping.unit:
         raise WrongUse(f"{where}: no unit is mapped, a serial number is needed; give --units SN")

@@ -333,9 +333,9 @@ def _is_motion(x: Array, duration_s: float, size: float, *, is_gravity: bool) ->
 
 def _turns(x: Array, duration_s: float, size: float) -> bool:
     """Whether the mean of a stretch moves through it, faster than a temperature moves it and than its scatter allows."""
-    place = np.linspace(-0.5, 0.5, len(x))
-    slope = 12.0 * (place @ x) / (len(x) + 2)  # over the stretch; Σ place² = n/12 within 1/n
-    left = x - x.mean(axis=0) - place[:, None] * slope
+    position = np.linspace(-0.5, 0.5, len(x))
+    slope = 12.0 * (position @ x) / (len(x) + 2)  # over the stretch; Σ place² = n/12 within 1/n
+    left = x - x.mean(axis=0) - position[:, None] * slope
     scatter = float(np.sqrt(np.sum(np.mean(left**2, axis=0))))
     turned = float(np.linalg.norm(slope))
     clear = turned > _TURN_SIGMAS * scatter * np.sqrt(12.0 / len(x))

@@ -94,17 +94,17 @@ def layout(lines: Sequence[str], filled: Sequence[int]) -> Layout | None:
     trailing = width > 1 and all(not f[-1] for f in (fields_of(s, divider) for s in sample) if len(f) == width)
     numeric = _numeric_columns(sample, divider, decimal, width)
     first = _first_row(lines, filled, divider, decimal, width, numeric)
-    place = filled.index(first) if first < len(lines) else len(filled)
+    index = filled.index(first) if first < len(lines) else len(filled)
     header, names, units, integers = -1, (), (), False
-    above = [fields_of(lines[k], divider) for k in filled[max(0, place - 2) : place]][::-1]
+    above = [fields_of(lines[k], divider) for k in filled[max(0, index - 2) : index]][::-1]
     if above and _is_header(above[0], width, decimal, trailing=trailing):
-        header, names = filled[place - 1], tuple(above[0])
+        header, names = filled[index - 1], tuple(above[0])
         named = [row for row in above[1:] if _is_header(row, width, decimal, trailing=trailing)]
         if named and _are_units(above[0], named[0]):
-            header, names, units = filled[place - 2], tuple(above[1]), tuple(above[0])
-    elif _only_numbered([fields_of(lines[k], divider) for k in filled[place : place + 2]]):
+            header, names, units = filled[index - 2], tuple(above[1]), tuple(above[0])
+    elif _only_numbered([fields_of(lines[k], divider) for k in filled[index : index + 2]]):
         header, names, integers = first, tuple(fields_of(lines[first], divider)), True
-        first = filled[place + 1]
+        first = filled[index + 1]
     elif not above or first > 0:
         names = _commented(lines, first, divider, width)
     kept = width - 1 if trailing else width
@@ -149,16 +149,16 @@ def _first_row(
     """The first line of the table: like the sampled ones, with the broken rows right above it, which are rows too."""
     if not any(numeric):
         return filled[1] if len(filled) > 1 else len(lines)  # names alone
-    alike = (place for place, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
-    place = next(alike, len(filled) - 1)
+    alike = (index for index, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
+    index = next(alike, len(filled) - 1)
     last_number = max(k for k, here in enumerate(numeric) if here)
-    while place > 0:
-        row = fields_of(lines[filled[place - 1]], divider)
+    while index > 0:
+        row = fields_of(lines[filled[index - 1]], divider)
         short = last_number < len(row) < width  # without its last fields, which hold no numbers
         if not (len(row) == width or short) or not any(is_number(word, decimal) for word in row):
             break
-        place -= 1
-    return filled[place]
+        index -= 1
+    return filled[index]
 
 
 def _is_row(row: list[str], decimal: str, numeric: list[bool]) -> bool:

@@ -194,9 +194,9 @@ def _remarks(detected: Layout, lines: Sequence[str], encoding: str) -> tuple[str
     begin = detected.first if detected.header < 0 else detected.header
     passed = [line for line in lines[:begin] if not is_comment(line)]
     if passed:
-        place = f"the {'header' if detected.header >= 0 else 'first row'} in line {begin + 1}"
+        where = f"the {'header' if detected.header >= 0 else 'first row'} in line {begin + 1}"
         start = shown(passed[0].strip(), 60)
-        remarks.append(f"{len(passed)} lines before {place} were not read, beginning with '{start}'")
+        remarks.append(f"{len(passed)} lines before {where} were not read, beginning with '{start}'")
     if detected.integers:
         numbers = ", ".join(filter(None, detected.names[:6]))
         remarks.append(f"line {detected.header + 1} only numbers the columns: {numbers}, …")
@@ -248,18 +248,18 @@ def _grouped(sign: str) -> re.Pattern[str]:
 def _is_separator(sign: str, rows: Sequence[Sequence[str]]) -> bool:
     """Whether a sign groups digits in all words that have it between digits."""
     words = [word for row in rows for word in row]
-    own = [word for word in words if re.search(rf"\d{re.escape(sign)}\d", word)]
+    signed = [word for word in words if re.search(rf"\d{re.escape(sign)}\d", word)]
     grouped = _grouped(sign)
-    if not own or not all(grouped.fullmatch(word) for word in own):
+    if not signed or not all(grouped.fullmatch(word) for word in signed):
         return False
     if sign not in {",", "."}:
         return True
     other = "." if sign == "," else ","
-    if any(other in word or word.count(sign) > 1 for word in own):
+    if any(other in word or word.count(sign) > 1 for word in signed):
         return True
     if any(other in word and is_number(word, other) for word in words):
         return True  # the decimal sign of this text is the other one
-    return len(own) >= _MANY and any(
+    return len(signed) >= _MANY and any(
         _mixed([row[k] for row in rows if k < len(row)], grouped) for k in range(max(map(len, rows)))
     )
 

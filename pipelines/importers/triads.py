@@ -79,7 +79,7 @@ class Sphere:
     @property
     def gravity(self) -> str:
         """The unit in which the radius, or the size of one pose, is that of gravity; empty for counts and volts."""
-        close = (u for u, one in unit_check.GRAVITY.items() if abs(self.radius / one - 1.0) < _CLOSE)
+        close = (u for u, gravity in unit_check.GRAVITY.items() if abs(self.radius / gravity - 1.0) < _CLOSE)
         return next(close, "")
 
 
@@ -142,7 +142,7 @@ def _unnamed(columns: Mapping[str, Array], free: Sequence[str], units: Mapping[s
         sphere = sphere_of(columns, names)
         if sphere is not None and sphere.fits and sphere.spans[0] > _MOVES:
             seen.append((names, sphere))
-    sized = [one for one in seen if one[1].gravity]
+    sized = [pair for pair in seen if pair[1].gravity]
     return _one_of(sized or seen, "three columns that move on a sphere at rest, as gravity does")
 
 
@@ -251,11 +251,11 @@ def _lettered(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
         stem = name.removesuffix("[0]")
         if stem != name and known.issuperset({f"{stem}[1]", f"{stem}[2]"}) and f"{stem}[3]" not in known:
             yield f"{stem}[?]", (name, f"{stem}[1]", f"{stem}[2]")
-        for place in (k for k, letter in enumerate(name) if letter in "xX"):
-            letters = "xyz" if name[place] == "x" else "XYZ"
-            three = tuple(name[:place] + letter + name[place + 1 :] for letter in letters)
+        for index in (k for k, letter in enumerate(name) if letter in "xX"):
+            letters = "xyz" if name[index] == "x" else "XYZ"
+            three = tuple(name[:index] + letter + name[index + 1 :] for letter in letters)
             if known.issuperset(three):
-                yield name[:place] + "?" + name[place + 1 :], three
+                yield name[:index] + "?" + name[index + 1 :], three
                 break
 
 
@@ -266,8 +266,8 @@ def may_be_output(name: str, unit: str) -> bool:
         return False
     if REFERENCE.match(name):
         return False
-    own = _OF_MATRIX.sub("", name)  # the name of a matrix is that of all its columns
-    return not ((OTHER.search(name) and not stated) or HEAT.search(own) or (COUNT.search(own) and not stated))
+    plain = _OF_MATRIX.sub("", name)  # the name of a matrix is that of all its columns
+    return not ((OTHER.search(name) and not stated) or HEAT.search(plain) or (COUNT.search(plain) and not stated))
 
 
 def _changes(numbers: Array) -> bool:

@@ -35,7 +35,7 @@ def size_of(output: Array) -> float:
 
 def looks_like(size: float) -> str:
     """The unit without a sensitivity in which gravity has this size, within a factor of two; empty if there is none."""
-    return next((unit for unit, one in GRAVITY.items() if LIKELY[0] < size / one < LIKELY[1]), "")
+    return next((unit for unit, gravity in GRAVITY.items() if LIKELY[0] < size / gravity < LIKELY[1]), "")
 
 
 def unit_of(output: Array, size: float, *, means: bool = False) -> tuple[str, str]:
@@ -113,7 +113,7 @@ def refuse_other_unit(output: Array, claimed: str, where: str, *, means: bool = 
             f"{where}: the norm of the output is {size:.5g}, about {GRAVITY[claimed]:.5g} is needed if its unit is {claimed}; "
             f"{advice}"
         )
-    close = next((unit for unit, one in GRAVITY.items() if abs(size / one - 1.0) < SURE), "")
+    close = next((unit for unit, gravity in GRAVITY.items() if abs(size / gravity - 1.0) < SURE), "")
     if claimed == "LSB":
         return _counts(output, size, close, where, may_be_parts=means and size > _FEWEST_COUNTS)
     volts = size * (1e-3 if claimed == "mV" else 1.0)

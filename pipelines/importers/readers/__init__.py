@@ -59,13 +59,13 @@ def find_readers(package: str, path: Iterable[str]) -> dict[str, FileReader]:
         if lacking:
             missing.append(f"{info.name}: no {', '.join(lacking)}")
             continue
-        one = cast("FileReader", module)
-        if any(one.NAME == other.NAME or one.ORDER == other.ORDER for other in readers):
-            missing.append(f"{info.name}: NAME '{one.NAME}' or ORDER {one.ORDER} is that of another reader")
-        readers.append(one)
+        reader = cast("FileReader", module)
+        if any(reader.NAME == other.NAME or reader.ORDER == other.ORDER for other in readers):
+            missing.append(f"{info.name}: NAME '{reader.NAME}' or ORDER {reader.ORDER} is that of another reader")
+        readers.append(reader)
     if missing:
         raise IncompleteReader(f"{package}: {'; '.join(missing)}")
-    return {one.NAME: one for one in sorted(readers, key=lambda reader: reader.ORDER)}
+    return {reader.NAME: reader for reader in sorted(readers, key=lambda reader: reader.ORDER)}
 
 
 READERS: dict[str, FileReader] = find_readers(__name__, __path__)

@@ -51,11 +51,13 @@ def read(name: str, data: bytes, group: str) -> Content:
         found = rdata.conversion.convert(parsed, classes, default_encoding="utf-8")
     objects = found if isinstance(found, dict) else {"frame": found}
     frames = {
-        str(key): one for key, one in objects.items() if isinstance(one, pd.DataFrame) and len(cast("Any", one.columns))
+        str(key): frame
+        for key, frame in objects.items()
+        if isinstance(frame, pd.DataFrame) and len(cast("Any", frame.columns))
     }
     if not frames:
         raise DataRejected(f"{name}: no data frame in this file of R, one is needed; {REMEDY}")
-    frame = frames[chosen([(key, len(one)) for key, one in frames.items()], group, name)]
+    frame = frames[chosen([(key, len(frame)) for key, frame in frames.items()], group, name)]
     return Content(pd.DataFrame({str(column): _plain_column(frame[column]) for column in frame.columns}))
 
 

@@ -30,12 +30,12 @@ def read(name: str, data: bytes, group: str) -> Content:
     messages = _LibraryLog()
     with foreign(f"{name}: a TDMS file that cannot be read", REMEDY), messages.collected():
         about = nptdms.TdmsFile.read_metadata(io.BytesIO(data))
-        claimed = sum(8 * len(channel) for one in about.groups() for channel in one.channels())
+        claimed = sum(8 * len(channel) for entry in about.groups() for channel in entry.channels())
         refuse_larger(claimed, len(data), name)
         file = nptdms.TdmsFile.read(io.BytesIO(data))
         groups = {
-            one.name: [c for c in one.channels() if len(c) and np.asarray(c[:1]).dtype.kind in "fiubM"]
-            for one in file.groups()
+            entry.name: [c for c in entry.channels() if len(c) and np.asarray(c[:1]).dtype.kind in "fiubM"]
+            for entry in file.groups()
         }
         groups = {label: channels for label, channels in groups.items() if channels}
         counts = [(label, len(channels[0])) for label, channels in groups.items()]
@@ -64,12 +64,12 @@ class _LibraryLog(logging.Handler):
         loggers = [logging.getLogger(name) for name in names]
         before = [(logger, list(logger.handlers), logger.propagate) for logger in loggers]
         try:
-            for one in loggers:
-                one.handlers, one.propagate = [self], False
+            for logger in loggers:
+                logger.handlers, logger.propagate = [self], False
             yield
         finally:
-            for one, handlers, propagate in before:
-                one.handlers, one.propagate = handlers, propagate
+            for logger, handlers, propagate in before:
+                logger.handlers, logger.propagate = handlers, propagate
 
 
 def _content(channels: list[Any], name: str) -> Content:
