@@ -99,8 +99,8 @@ def filtered(
             )
     parts: list[Array] = []
     for first, last in pairwise([0, *np.flatnonzero(gap).tolist(), len(done.force)]):
-        own = chosen.steady(done.force[first]) if state is None or first else state
-        smooth, state = chosen.apply(done.force[first:last], own)
+        begun = chosen.steady(done.force[first]) if state is None or first else state
+        smooth, state = chosen.apply(done.force[first:last], begun)
         parts.append(smooth)
     if state is None:
         raise DataRejected(f"{recording.name}: no samples, some are needed for a filter; record them")
@@ -147,11 +147,14 @@ def read_state(path: Path, unit: str) -> Kept | None:
 
 
 def _kept(content: dict[str, Any]) -> Kept:
-    own, track = content["filter"], content["track"]
+    low_pass, track = content["filter"], content["track"]
     passed = followed = None
-    if own is not None:
-        taps = (np.array(own[name], dtype=np.float64) for name in ("numerator", "denominator"))
-        passed = OutputFilter(own["kind"], float(own["rate_hz"]), *taps), np.array(own["state"], dtype=np.float64)
+    if low_pass is not None:
+        taps = (np.array(low_pass[name], dtype=np.float64) for name in ("numerator", "denominator"))
+        passed = (
+            OutputFilter(low_pass["kind"], float(low_pass["rate_hz"]), *taps),
+            np.array(low_pass["state"], dtype=np.float64),
+        )
     if track is not None:
         state = BiasState(*(np.array(track[name], dtype=np.float64) for name in ("x", "p")))
         arrays = {name: np.array(track[name]) for name in ("sd", "correlation_s")}
@@ -165,11 +168,11 @@ def write_state(path: Path, kept: Kept) -> None:
 
     The names of its keys are those of the attributes of filter, bias and flicker: whoever renames one changes the file's format.
     """
-    own, track = kept.filter, kept.track
+    low_pass, track = kept.filter, kept.track
     content = {
         "unit": kept.unit,
         "time_s": kept.time_s,
-        "filter": None if own is None else _plain(vars(own[0]) | {"state": own[1]}),
+        "filter": None if low_pass is None else _plain(vars(low_pass[0]) | {"state": low_pass[1]}),
         "track": None if track is None else _plain({"time_s": track.time_s} | vars(track.state) | vars(track.flicker)),
     }
     files.publish(path, files.json_bytes(content), "correct", files.ELSEWHERE)

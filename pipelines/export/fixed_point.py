@@ -60,11 +60,11 @@ def fixed_point(unit: UnitCalibration) -> FixedPoint:
     WrongUse
         A coefficient is beyond ±128.
     """
-    own = list(unit.axes)
+    axes = list(unit.axes)
     whole = unit.with_every_axis
-    scale = float(np.mean(np.diag(whole.response[0])[own]))
+    scale = float(np.mean(np.diag(whole.response[0])[axes]))
     per_axis = np.ones(len(AXES))
-    per_axis[own] = scale
+    per_axis[axes] = scale
     span = TEMPERATURE_SPAN_K ** np.arange(ORDER)
     low, high = unit.temperatures
     middle, half = 0.5 * (low + high) - 25.0, 0.5 * (high - low)
@@ -82,7 +82,7 @@ def fixed_point(unit: UnitCalibration) -> FixedPoint:
             "range; export with --set arithmetic=float"
         )
     bias, matrix = (v.astype(np.int64) for v in values)
-    for axis in set(range(len(AXES))) - set(own):
+    for axis in set(range(len(AXES))) - set(axes):
         matrix[:, axis] = 0
         matrix[0, axis, axis] = ONE
     return FixedPoint(scale, bias, matrix, thousandths(unit.temperatures))

@@ -71,10 +71,10 @@ class UnitCalibration:
         """The calibration with three outputs: that of an axis without one is the force along it in g, 0 where it is not known."""
         if self.bias.shape[-1] == len(AXES):
             return self
-        own = list(self.axes)
+        axes = list(self.axes)
         bias, response = np.zeros((ORDER, len(AXES))), np.zeros((ORDER, len(AXES), 3))
         response[0] = np.eye(len(AXES))
-        bias[:, own], response[:, own] = self.bias, self.response
+        bias[:, axes], response[:, axes] = self.bias, self.response
         return replace(self, bias=bias, response=response)
 
     def with_forces(self, output: Array, force: Array) -> Array:
@@ -233,7 +233,7 @@ def revoked_units(run: Run) -> dict[str, validity.Calibration]:
     if "grades" not in run.tables():
         return {}
     states = stated(run, tuple(run.table("grades")["unit"]))
-    return {unit: one for unit, one in states.items() if one.state == "revoked"}
+    return {unit: calibration for unit, calibration in states.items() if calibration.state == "revoked"}
 
 
 def _not_revoked(
@@ -286,8 +286,8 @@ def polynomials(calibration: Calibration, unit: str) -> tuple[Array, Array]:
         if values.size:
             for row, axis in enumerate(axes):
                 # one column where the poses of a device with fewer axes show one direction across
-                own = [name for name_of, name in calibration.names[row] if name_of == effect]
-                shown = others(axis) if len(own) > 1 else ["xyz".index(own[0][-1])]
+                names = [name for name_of, name in calibration.names[row] if name_of == effect]
+                shown = others(axis) if len(names) > 1 else ["xyz".index(names[0][-1])]
                 response[power, row, shown] = values[row]
     for power, effect in enumerate(SCALE):
         values = calibration.value(effect)[u]

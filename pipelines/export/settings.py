@@ -38,18 +38,18 @@ class Firmware:
         self, literal: Callable[[Any], str], braces: Callable[[Any, Callable[[Any], str]], str]
     ) -> dict[str, str]:
         """What stands in the template of the low-pass."""
-        one = self.low_pass
-        if one is None:
+        low_pass = self.low_pass
+        if low_pass is None:
             return {}
-        steady = np.concatenate([one.steady(np.ones(1))[:, 0], [0.0]])
+        steady = np.concatenate([low_pass.steady(np.ones(1))[:, 0], [0.0]])
         return {
-            "FILTER": f"{one.kind}, {one.numerator.size} coefficients",
-            "CUTOFF": f"{one.cutoff_hz:.6g}",
-            "RATE": f"{one.rate_hz:.9g}",
-            "DELAY": f"{1e3 * one.delay_s:.4g}",
-            "TAPS": str(one.numerator.size),
-            "B": braces(one.numerator, literal),
-            "A": braces(one.denominator, literal),
+            "FILTER": f"{low_pass.kind}, {low_pass.numerator.size} coefficients",
+            "CUTOFF": f"{low_pass.cutoff_hz:.6g}",
+            "RATE": f"{low_pass.rate_hz:.9g}",
+            "DELAY": f"{1e3 * low_pass.delay_s:.4g}",
+            "TAPS": str(low_pass.numerator.size),
+            "B": braces(low_pass.numerator, literal),
+            "A": braces(low_pass.denominator, literal),
             "STEADY": braces(steady, literal),
         }
 
