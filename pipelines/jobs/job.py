@@ -113,8 +113,8 @@ class Job:
             unmoved.add("equipment")
         station = self.station.model_dump(mode="json", exclude=unmoved)
         after = {"parents": list(self.parents)} if self.parents else {}
-        own = {"own_files": hashes} if (hashes := self.own_files) else {}
-        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after, **own, **decided}
+        files = {"own_files": hashes} if (hashes := self.own_files) else {}
+        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after, **files, **decided}
         return digest(content)[:16]
 
     @property
@@ -149,7 +149,7 @@ class Job:
             "capture": self.capture_id,
             **({"parents": list(self.parents)} if self.parents else {}),
             **({"prior": self.prior.model_dump()} if self.prior is not None else {}),
-            **({"own_files": own} if not self.captured and (own := self.own_files) else {}),
+            **({"own_files": hashes} if not self.captured and (hashes := self.own_files) else {}),
         }
 
 
@@ -297,7 +297,7 @@ def _refuse_more_units_than_slots(job: Job) -> None:
     serials, slots = [unit.serial for unit in job.lot.units], job.station.devices.slots.count
     if len(serials) > slots:
         lots = fillings(serials, slots)
-        commands = ", then ".join(f"--units {','.join(own)}" for own in lots)
+        commands = ", then ".join(f"--units {','.join(serials)}" for serials in lots)
         raise WrongUse(
             f"lot: {len(serials)} units, the fixture has {slots} slots; measure {len(lots)} lots, one after the other: "
             f"{commands}"

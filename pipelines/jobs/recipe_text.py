@@ -79,8 +79,8 @@ def _item(key: str, value: Any) -> Item:
     """A value as an item of the document; lists that are too long for a line stand one entry a line."""
     if isinstance(value, list) and value and isinstance(value[0], dict):
         several = tomlkit.aot()
-        for one in value:
-            several.append(_table(one))
+        for row in value:
+            several.append(_table(row))
         return several
     if isinstance(value, dict):
         return _table(value)

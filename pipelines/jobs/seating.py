@@ -82,7 +82,7 @@ def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
     where = f"slot map {path.name}"
     lines = content.splitlines()
     first = lines[0] if lines else ""
-    divider = next((one for one in DIVIDERS if one in first), DIVIDERS[0])
+    divider = next((sign for sign in DIVIDERS if sign in first), DIVIDERS[0])
     with foreign(f"{where}: not a table of text", "save it as CSV again", WrongUse):
         rows = list(csv.reader(io.StringIO(content), delimiter=divider))
     head = [cell.strip().lower() for cell in rows[0]] if rows else []
