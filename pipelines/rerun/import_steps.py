@@ -94,7 +94,7 @@ def import_step(data: ImportedData, left_out: Dwells, old: Run) -> StageCall:
     names = data.read()
     if not left_out:
         return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
-    parameters = {"left_out": [list(one) for one in left_out], "dwells": old.manifest("dwells")["sha256"]}
+    parameters = {"left_out": [list(pair) for pair in left_out], "dwells": old.manifest("dwells")["sha256"]}
 
     def call(_: Run) -> Tables:
         return {**{name: old.table(name) for name in names}, "dwells": leave_out(old.table("dwells"), left_out)}
