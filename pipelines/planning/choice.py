@@ -43,8 +43,8 @@ class Need:
 
 def _root(values: float | tuple[float, float, float]) -> float:
     """The root mean square of a figure of one axis or three."""
-    own = values if isinstance(values, tuple) else (values,)
-    return math.sqrt(sum(v * v for v in own) / len(own))
+    by_axis = values if isinstance(values, tuple) else (values,)
+    return math.sqrt(sum(v * v for v in by_axis) / len(by_axis))
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def choice(need: Need, devices: list[str]) -> ChoiceDocument:
     """
     known = preset_names()
     for name in devices:
-        if name.lower() not in {one.lower() for one in known}:
+        if name.lower() not in {preset.lower() for preset in known}:
             raise WrongUse(f"--device: no preset '{name}'; {did_you_mean(name, known)}")
     rows = [_row(load_preset(name), need, calibration) for name in devices or known for calibration in CALIBRATIONS]
     order = list(CALIBRATIONS)

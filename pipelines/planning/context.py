@@ -48,8 +48,8 @@ class PlanContext:
     @property
     def minutes(self) -> float:
         """Station time without the static record, min."""
-        own = spent(self.activities)
-        return own.total - own.static_record
+        times = spent(self.activities)
+        return times.total - times.static_record
 
     @property
     def heat(self) -> NDArray[np.float64]:
@@ -141,7 +141,7 @@ def procedure_rows(recipe: Recipe, station: StationConfig, limits: Limits | None
     rows: list[dict[str, Any]] = []
     for number, part in enumerate(parts_of(recipe)):
         procedure = PROCEDURES[part.kind]
-        own = [activity for activity in activities if activity.step.procedure == number]
+        of_procedure = [activity for activity in activities if activity.step.procedure == number]
         figures = [
             {
                 "figure": s.name,
@@ -154,9 +154,9 @@ def procedure_rows(recipe: Recipe, station: StationConfig, limits: Limits | None
         row = {
             "procedure": part.kind,
             "states": procedure.states,
-            "records": len({activity.step.record for activity in own}),
-            "minutes": round(spent(own).total, 2),
-            "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in own)),
+            "records": len({activity.step.record for activity in of_procedure}),
+            "minutes": round(spent(of_procedure).total, 2),
+            "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in of_procedure)),
             "equipment": list(procedure.roles_for(part)),
             "figures": figures,
         }

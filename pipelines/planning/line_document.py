@@ -19,7 +19,7 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
     recipe_named : the recipe of a name in the line's file
     """
     recipes = [(recipe_named(lot.recipe), lot.count) for lot in line.lots]
-    phases = [own for recipe, number in recipes for own in [phases_of(recipe, station)] * number]
+    phases = [lot_phases for recipe, number in recipes for lot_phases in [phases_of(recipe, station)] * number]
     counters = {recipe.name: count(1) for recipe, _ in recipes}
     names = [recipe.name for recipe, number in recipes for _ in range(number)]
     used, best, alone, bound = _best(line, phases)
@@ -28,8 +28,8 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
     labels = [f"{name}-{next(counters[name])}" for name in names]
     activities = [
         activity
-        for label, fixture, placed, own in zip(labels, fixtures, best.lots, phases, strict=True)
-        for activity in _activities(used, label, fixture, placed, own)
+        for label, fixture, placed, lot_phases in zip(labels, fixtures, best.lots, phases, strict=True)
+        for activity in _activities(used, label, fixture, placed, lot_phases)
     ]
     resources = _resources(used, phases)
     return {
@@ -81,9 +81,9 @@ def free_places(spans: Sequence[tuple[int, int]]) -> list[int]:
     places = [0] * len(spans)
     for number in sorted(range(len(spans)), key=lambda k: spans[k]):
         begin, end = spans[number]
-        place = next((k for k, taken in enumerate(until) if taken <= begin), len(until))
-        until[place : place + 1] = [end]
-        places[number] = place
+        free = next((k for k, taken in enumerate(until) if taken <= begin), len(until))
+        until[free : free + 1] = [end]
+        places[number] = free
     return places
 
 

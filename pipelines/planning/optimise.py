@@ -153,7 +153,7 @@ class RecipeSearch:
             if math.isfinite(seconds):
                 tried += [self.with_fewest_dwells(order, length) for length in self.timed.dwell_lengths()]
         chosen: list[tuple[PlanDesign, float]] = []
-        for seconds, plan in sorted(tried, key=lambda one: one[0]):
+        for seconds, plan in sorted(tried, key=lambda trial: trial[0]):
             used = {other.order for other, _ in chosen}
             # the starting arrangement says little of a ramp: other lengths of its dwells are tried beside it
             again = not self.ramp and bool({plan.order, mirrored(plan.order)} & used)
@@ -250,17 +250,17 @@ class RecipeSearch:
         The ramp that gets nearest to an end goes on through its own poses, in their order, until the device is there.
         """
         low, high = min(self.requirement.levels), max(self.requirement.levels)
-        own = [part.poses or [] for part in context.recipe.soaks]
+        poses = [part.poses or [] for part in context.recipe.soaks]
         for added in range(MOST):
             heat = context.heat
             if not short_of(heat, self.requirement.levels):
                 break
             end = low if heat.min() - low >= high - heat.max() else high
             step = [activity.step for activity in context.activities if activity.kind == "dwell"]
-            towards = [k for k, one in enumerate(step) if one.temperature == end]
+            towards = [k for k, planned in enumerate(step) if planned.temperature == end]
             leg = step[min(towards, key=lambda k: abs(heat[k] - end))].soak
             soaks = list(context.recipe.soaks)
-            more = own[leg][1 + added % (len(own[leg]) - 1)]  # a ramp begins and ends with the same pose
+            more = poses[leg][1 + added % (len(poses[leg]) - 1)]  # a ramp begins and ends with the same pose
             soaks[leg] = soaks[leg].model_copy(update={"poses": [*(soaks[leg].poses or []), more]})
             context = self.on_station(context.recipe.model_copy(update={"soaks": soaks}))
         return context

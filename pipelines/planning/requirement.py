@@ -161,12 +161,12 @@ def orders(
     for count in range(FEWEST if back else 1, MOST + 1):
         if len(free) ** count > PRODUCTS:
             break
-        own = [
+        of_length = [
             o
             for o in product(free, repeat=count)
             if set(levels) <= set(o) and all(a != b for a, b in pairwise(o)) and (not back or _returns(o))
         ]
-        candidates += sorted(own, key=lambda order: soak_seconds(order, station, shortest_s))[:MANY]
+        candidates += sorted(of_length, key=lambda order: soak_seconds(order, station, shortest_s))[:MANY]
     return sorted(candidates, key=lambda order: soak_seconds(order, station, shortest_s))
 
 

@@ -51,13 +51,15 @@ def reference_errors(against: PlanContext, recipe: Recipe) -> Array:
     try:
         return identified(against).errors
     except NotIdentified:
-        own = identified(plan_context(recipe, against.station, against.noise, slowest=float(against.state.time[-1])))
+        expected = identified(
+            plan_context(recipe, against.station, against.noise, slowest=float(against.state.time[-1]))
+        )
     model = list(recipe.effects)
-    names = [name for name, _ in own.names[0]]
+    names = [name for name, _ in expected.names[0]]
     for effect in _hidden(against.state, model):
         model.remove(effect)
     there = expected_errors(model, against.state, against.covariance)
-    errors = own.errors.copy()
+    errors = expected.errors.copy()
     errors[:, [k for k, name in enumerate(names) if name in model]] = there.errors
     return errors
 

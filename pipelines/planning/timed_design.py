@@ -136,10 +136,10 @@ class TimedDesign:
         covariance = dwell_covariance(time, dwell_s, replace(self.noise, instability=0.0))
         if self.noise.instability > 0.0:
             longest = max(self.slowest, _LONG_S * math.ceil(float(time.max()) / _LONG_S))
-            grid, values, own = _flicker(dwell_s, self.slowest if time.max() <= self.slowest else longest)
+            grid, values, variance = _flicker(dwell_s, self.slowest if time.max() <= self.slowest else longest)
             gap = np.abs(time[:, None] - time)
             flicker = np.interp(gap, grid, values)
-            np.fill_diagonal(flicker, own)
+            np.fill_diagonal(flicker, variance)
             covariance += self.noise.instability**2 * flicker
         return covariance
 
