@@ -103,7 +103,7 @@ class Graph:
         while open_ids:
             for step in links.get(open_ids.pop(), []):
                 steps.add(step.id)
-                new = {one for one in (step.made if forward else step.used) if one in self.nodes} - nodes
+                new = {node for node in (step.made if forward else step.used) if node in self.nodes} - nodes
                 nodes |= new
                 open_ids += new
         return nodes, steps
