@@ -74,11 +74,11 @@ def program_teds(
         require_safe(station, config.suspenders.door)
         if station.reader.sampling() == "running":
             station.reader.stop()
-        for one in outcomes:
-            one.memory.require()
-            if not slots[one.slot].holds(one.unit):
+        for outcome in outcomes:
+            outcome.memory.require()
+            if not slots[outcome.slot].holds(outcome.unit):
                 raise OperatorNeeded(
-                    f"slot {one.slot}: unit {one.unit} is not in it; seat the unit, or correct the lot"
+                    f"slot {outcome.slot}: unit {outcome.unit} is not in it; seat the unit, or correct the lot"
                 )
         for step, act in (("archive the memory", _archive), ("write", _write), ("read back", _read_back)):
             _each(outcomes, step, act, report)
@@ -88,8 +88,8 @@ def program_teds(
             power_cycle(station, config.suspenders.door)
         _each(outcomes, "read back after the power cycle", _read_back, report)
         saved()
-    for one in outcomes:
-        one.outcome = "proved" if one.outcome == "begun" else one.outcome
+    for outcome in outcomes:
+        outcome.outcome = "proved" if outcome.outcome == "begun" else outcome.outcome
     return outcomes
 
 
