@@ -166,14 +166,14 @@ class Improvement:
                 )
         answers: list[dict[str, Any]] = []
         for members in classes:
-            own = [name for name in named if name in members]
-            if len(own) > 1:
+            chosen = [name for name in named if name in members]
+            if len(chosen) > 1:
                 raise WrongUse(
-                    f"improve: --effect {','.join(own)}: these data cannot separate them, one per class is needed; name one"
+                    f"improve: --effect {','.join(chosen)}: these data cannot separate them, one per class is needed; name one"
                 )
-            effect = next(name for name in (*own, *diagnosis["recommended"]) if name in members)
+            effect = next(name for name in (*chosen, *diagnosis["recommended"]) if name in members)
             others = [name for name in members if name != effect]
-            decided, added = self._answer(effect, others, chosen=bool(own), named=bool(named), yes=yes)
+            decided, added = self._answer(effect, others, chosen=bool(chosen), named=bool(named), yes=yes)
             answers.append({"effect": effect, "not_separated_from": others, "decided_by": decided, "added": added})
         return answers
 

@@ -59,7 +59,7 @@ def bring_in(
         "files": [str(path) for path in paths],
         "form": seen.source.form,
         "rows": len(seen.content.table),
-        "columns": {meaning: one for meaning in proposal.keys["columns"] if (one := guessed.column(meaning))},
+        "columns": {meaning: column for meaning in proposal.keys["columns"] if (column := guessed.column(meaning))},
         "reason": guessed.triad.reason,
         "output_unit": guessed.output.meaning,
         "output_reason": guessed.output.reason,
