@@ -32,7 +32,9 @@ class RunTime:
 
     def __add__(self, other: Self) -> Self:
         """The sum of two runs, field by field."""
-        return type(self)(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
+        return type(self)(
+            **{field.name: getattr(self, field.name) + getattr(other, field.name) for field in fields(self)}
+        )
 
 
 @dataclass
