@@ -42,8 +42,8 @@ def archive_of(parameter: str | None) -> Archive:
         return Archive()
     if parameter.startswith(BLOCK):
         return Archive(_of_block(parameter.removeprefix(BLOCK)))
-    own = os.environ.get(VARIABLE, "")
-    return Archive(own if own and without_credentials(own) == parameter else parameter)
+    address = os.environ.get(VARIABLE, "")
+    return Archive(address if address and without_credentials(address) == parameter else parameter)
 
 
 @contextmanager

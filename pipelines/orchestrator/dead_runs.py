@@ -127,9 +127,11 @@ def lives(run: FlowRun) -> bool:
     pid = run.infrastructure_pid
     if pid and not pid.isdecimal():
         return False
-    places = [PROCESSES / pid] if pid else [place for place in PROCESSES.glob("[0-9]*") if place.name.isdecimal()]
+    processes = (
+        [PROCESSES / pid] if pid else [process for process in PROCESSES.glob("[0-9]*") if process.name.isdecimal()]
+    )
     mark = f"PREFECT__FLOW_RUN_ID={run.id}".encode()
-    return any(mark in _environment(place).split(b"\0") for place in places if int(place.name) != os.getpid())
+    return any(mark in _environment(process).split(b"\0") for process in processes if int(process.name) != os.getpid())
 
 
 def _environment(process: Path) -> bytes:

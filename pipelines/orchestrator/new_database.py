@@ -31,8 +31,8 @@ def make_database(home: Path) -> bool:
     Nothing is done where the database has an address of its own or where there is one already, and where nothing can be stored:
     Prefect makes it at its start, or says why it cannot.
     """
-    place = home / NAME
-    if os.environ.get(DATABASE) or place.exists():
+    path = home / NAME
+    if os.environ.get(DATABASE) or path.exists():
         return False
     try:
         content = _stored() or _made()
@@ -40,7 +40,7 @@ def make_database(home: Path) -> bool:
             file.write(content)
             file.flush()
             # complete or not at all, and never over one that another process has just made
-            place.hardlink_to(file.name)
+            path.hardlink_to(file.name)
     except (OSError, RuntimeError, sqlite3.Error, subprocess.SubprocessError):  # RuntimeError: the user has no home
         return False
     return True

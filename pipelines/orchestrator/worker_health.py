@@ -116,5 +116,5 @@ def heartbeat_of(pool: str, name: str) -> str:
     from prefect.client.orchestration import get_client
 
     with get_client(sync_client=True) as client:
-        workers = [one for one in client.read_workers_for_work_pool(pool) if one.name == name]
+        workers = [worker for worker in client.read_workers_for_work_pool(pool) if worker.name == name]
     return workers[0].last_heartbeat_time.isoformat() if workers and workers[0].last_heartbeat_time else ""
