@@ -40,9 +40,9 @@ listeners: list[tuple[Progress, Callable[[Done], None], Operator | None]] = []
 
 
 @contextmanager
-def with_last(listed: list[T], one: T) -> Generator[None]:
+def with_last(listed: list[T], item: T) -> Generator[None]:
     """A context in which one more stands at the end of a list."""
-    listed.append(one)
+    listed.append(item)
     try:
         yield
     finally:
@@ -160,6 +160,6 @@ def settle_history(name: str, stages: int) -> None:
             tasks = client.read_task_runs(
                 flow_run_filter=flow_filter, sort=TaskRunSort.EXPECTED_START_TIME_ASC, limit=MANY
             )
-            if len(tasks) >= stages and all(one.state_type in FINAL for one in tasks):
+            if len(tasks) >= stages and all(task.state_type in FINAL for task in tasks):
                 return
             time.sleep(0.1)

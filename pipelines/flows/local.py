@@ -116,8 +116,8 @@ def reached(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generat
         from prefect.settings import temporary_settings
 
         # Prefect reads the environment when it is imported, which an earlier block may have done for another server
-        own: dict[Any, str] = {name: environment[name] for name in ("PREFECT_API_URL", "PREFECT_HOME", CLIENT_KEY)}
-        with temporary_settings(updates=own):
+        updates: dict[Any, str] = {name: environment[name] for name in ("PREFECT_API_URL", "PREFECT_HOME", CLIENT_KEY)}
+        with temporary_settings(updates=updates):
             yield
 
 
