@@ -94,10 +94,10 @@ def _not_reached(run: Run, recipe: Recipe) -> Iterator[NotReached]:
         return
     stated = run.table("uncertainties")
     if stated.empty:
-        own = run.table("coefficients")
-        scale = own[own["effect"] == "scale"].set_index(["unit", "axis"])["value"].abs()
-        per_g = scale.reindex(pd.MultiIndex.from_frame(own[["unit", "axis"]])).to_numpy()
-        stated = own.assign(quantity=own["effect"], u=MICRO * own["standard_error"] / per_g)
+        coefficients = run.table("coefficients")
+        scale = coefficients[coefficients["effect"] == "scale"].set_index(["unit", "axis"])["value"].abs()
+        per_g = scale.reindex(pd.MultiIndex.from_frame(coefficients[["unit", "axis"]])).to_numpy()
+        stated = coefficients.assign(quantity=coefficients["effect"], u=MICRO * coefficients["standard_error"] / per_g)
     factor = run.about["limits"]["coverage_factor"]
     for effect, asked in recipe.stop.asked.items():
         largest = factor / asked * stated[stated["quantity"] == effect].groupby("unit", observed=True)["u"].max()

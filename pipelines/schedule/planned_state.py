@@ -153,8 +153,8 @@ class Planned(NamedTuple):
 def planned_dwells(recipe: Recipe, station: StationConfig, activities: list[Activity] | None = None) -> Planned:
     """The dwells that a recipe plans on a station."""
     whole = schedule(steps(recipe), station, recipe) if activities is None else activities
-    own = [one for one in whole if one.kind == "dwell"]
-    checks = [one for one in whole if one.kind == "verification"]
+    dwells = [activity for activity in whole if activity.kind == "dwell"]
+    checks = [activity for activity in whole if activity.kind == "verification"]
     verification = state_of(whole, station, recipe, kinds=("verification",)) if checks else None
-    soak, target = (np.array([getattr(one.step, name) for one in own]) for name in ("soak", "temperature"))
+    soak, target = (np.array([getattr(activity.step, name) for activity in dwells]) for name in ("soak", "temperature"))
     return Planned(state_of(whole, station, recipe), verification, soak, target)
