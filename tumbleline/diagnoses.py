@@ -156,5 +156,7 @@ def effects() -> pd.DataFrame:
     from inertial.effects import catalogue
 
     columns = ("symbol", "equation", "scope", "breaker")
-    rows = [{"id": name, **{column: getattr(one, column) for column in columns}} for name, one in catalogue().items()]
+    rows = [
+        {"id": name, **{column: getattr(effect, column) for column in columns}} for name, effect in catalogue().items()
+    ]
     return pd.DataFrame(rows)

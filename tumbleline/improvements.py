@@ -35,7 +35,7 @@ class ImprovedModel(JudgedModel):
     def undecided(self) -> list[list[str]]:
         """Classes of effects that these data do not separate: none was added; name one with ``effect=``."""
         open_ = [choice for choice in self.document["choices"] if choice["decided_by"] == "undecided"]
-        return [[one["effect"], *one["not_separated_from"]] for one in open_]
+        return [[choice["effect"], *choice["not_separated_from"]] for choice in open_]
 
     @property
     def ladder(self) -> pd.DataFrame:

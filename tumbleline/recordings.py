@@ -74,13 +74,13 @@ class Recording:
         from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
 
         dwells = self.dwells
-        own = dwells[dwells["unit"] == dwells["unit"].iloc[0]]
-        names = [name for name in ("out_x", "out_y", "out_z") if name in own]
-        unit = str(own["out_unit"].iloc[0]) if "out_unit" in own else ""
-        x = own["dwell"].to_numpy(dtype=float)
+        rows = dwells[dwells["unit"] == dwells["unit"].iloc[0]]
+        names = [name for name in ("out_x", "out_y", "out_z") if name in rows]
+        unit = str(rows["out_unit"].iloc[0]) if "out_unit" in rows else ""
+        x = rows["dwell"].to_numpy(dtype=float)
         roles: dict[str, Role] = {"x": "x", "y": "y", "z": "z"}
-        traces = tuple(Trace(name[-1], x, own[name].to_numpy(dtype=float), role=roles[name[-1]]) for name in names)
-        title = f"Outputs of {own['unit'].iloc[0]}"
+        traces = tuple(Trace(name[-1], x, rows[name].to_numpy(dtype=float), role=roles[name[-1]]) for name in names)
+        title = f"Outputs of {rows['unit'].iloc[0]}"
         return Picture(Chart(title, (Plot(title, PlotAxis("dwell"), PlotAxis(f"output / {unit}"), traces),)))
 
     def _lines(self) -> list[str]:
@@ -134,7 +134,7 @@ def read(
     from pipelines.importers import files
 
     if not isinstance(source, str | Path):
-        return _imported([Path(one) for one in source], columns, units, serial, archive, stated)
+        return _imported([Path(path) for path in source], columns, units, serial, archive, stated)
     if not files.is_file(str(source)):
         return Recording(Archive(None if archive is None else str(archive)).run(str(source)))
     path = Path(source)
