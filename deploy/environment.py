@@ -66,7 +66,7 @@ def set_up(name: str, folder: Path, *, asked: bool = False) -> None:
     if why:
         _say(f"{folder.relative_to(ROOT)}: {why}; it is made anew")
         shutil.rmtree(folder)
-    if not why and any(_is_current(folder, one) for one in (name, *HELD_BY.get(name, ()))):
+    if not why and any(_is_current(folder, lock_name) for lock_name in (name, *HELD_BY.get(name, ()))):
         return
     python = f"Python {platform.python_version()}"
     _say(
@@ -122,7 +122,7 @@ def reason(text: str, lock: Path, folder: Path) -> str:
         "python": folder / "bin" / "python",
         "system": f"Python {platform.python_version()} on {platform.system()} {platform.machine()}",
     }
-    collected = [one.rpartition("/")[2] for one in COLLECTED.findall(text)] or ["pip"]
+    collected = [collected.rpartition("/")[2] for collected in COLLECTED.findall(text)] or ["pip"]
     for pattern, found, remedy in FAILURES:
         hit = pattern.search(text)
         if hit is not None:
@@ -188,8 +188,8 @@ def _say(line: str) -> None:
 
 def main(words: list[str]) -> int:
     """Set up; a failure is one line."""
-    with Path(__file__).open(encoding="utf-8") as own:
-        fcntl.flock(own, fcntl.LOCK_EX)  # make -j calls this for two locks at a time
+    with Path(__file__).open(encoding="utf-8") as script:
+        fcntl.flock(script, fcntl.LOCK_EX)  # make -j calls this for two locks at a time
         try:
             set_up(words[0], ROOT / words[1], asked="--asked" in words[2:])
         except NotSetUp as problem:

@@ -25,12 +25,12 @@ def build(folder: Path, root: Path = ROOT) -> tuple[Path, Path]:
     root : the tree; it is copied, and stays as it is
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="tumbleline-release-") as place:
-        copy = Path(place) / "tree"
+    with tempfile.TemporaryDirectory(prefix="tumbleline-release-") as temporary:
+        copy = Path(temporary) / "tree"
         shutil.copytree(root, copy, ignore=lambda folder, names: _no_source(Path(folder) == root, names))
         source = folder / _run(copy, "build_sdist", folder)
-        unpack(source, Path(place))
-        wheel = folder / _run(Path(place) / source.name.removesuffix(".tar.gz"), "build_wheel", folder)
+        unpack(source, Path(temporary))
+        wheel = folder / _run(Path(temporary) / source.name.removesuffix(".tar.gz"), "build_wheel", folder)
     return wheel, source
 
 
