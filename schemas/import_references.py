@@ -50,7 +50,7 @@ class ImportReferences(Strict):
             "kind": "imported",
             "description": self.description,
             "pace": {"room_C": self.room_C},
-            "reference": [one.model_dump(mode="json") for one in self.reference],
+            "reference": [reference.model_dump(mode="json") for reference in self.reference],
             "uncertainty": self.uncertainty.model_dump(mode="json"),
         }
 

@@ -53,8 +53,8 @@ def to_complete(library: str, found: str) -> str:
 
 
 def _is_of_installation(file: str) -> bool:
-    own = [_TREE / name for name in _OWN]
-    return bool(_libraries_of(file)) or any(Path(file).is_relative_to(folder) for folder in own)
+    folders = [_TREE / name for name in _OWN]
+    return bool(_libraries_of(file)) or any(Path(file).is_relative_to(folder) for folder in folders)
 
 
 def _libraries_of(file: str) -> tuple[str, ...]:

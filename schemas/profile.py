@@ -226,8 +226,8 @@ class Profile(Strict):
                     key="maximum",
                 )
 
-        def least(name: str, own: float | None) -> dict[str, float]:
-            return {"maximum": min(maximum[name], math.inf if own is None else own)} if name in maximum else {}
+        def least(name: str, stated: float | None) -> dict[str, float]:
+            return {"maximum": min(maximum[name], math.inf if stated is None else stated)} if name in maximum else {}
 
         motion = Motion(**{name: value for name, value in maximum.items() if name in moving})
         return self.model_copy(

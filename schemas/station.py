@@ -136,9 +136,9 @@ class StationConfig(Grown):
         if self.kind == "modbus":
             addressed = {f"devices.{name}": getattr(self.devices, name) for name in Devices.model_fields}
             addressed |= {f"equipment.{role}": device for role, device in self.equipment.there().items()}
-            for place, device in addressed.items():
+            for key, device in addressed.items():
                 if missing := device.missing():
-                    raise ValueError(f"{place}.{missing}: empty, a station of kind modbus needs one; add it")
+                    raise ValueError(f"{key}.{missing}: empty, a station of kind modbus needs one; add it")
             supply = self.equipment.power_supply
             if supply is not None and "voltage" not in supply.maximum:
                 raise ValueError(
@@ -163,11 +163,11 @@ def refuse_untraced(stated: Uncertainty, references: Sequence[Reference], *, sim
             raise ValueError(
                 f"uncertainty.{name}.reference: no [[reference]] is called '{entry.reference}' (there are: {named}); add it"
             )
-        own, claimed = known[entry.reference], entry.standard("offset" if name == "thermometer" else "")
-        least = own.standard(claimed.unit)
+        source, claimed = known[entry.reference], entry.standard("offset" if name == "thermometer" else "")
+        least = source.standard(claimed.unit)
         if least is not None and claimed.unit and least > claimed.u * (1.0 + 1e-9):
             raise ValueError(
-                f"uncertainty.{name}: u = {claimed.u / TO_SI[claimed.unit]:.3g} {claimed.unit}, reference {own.id} has "
+                f"uncertainty.{name}: u = {claimed.u / TO_SI[claimed.unit]:.3g} {claimed.unit}, reference {source.id} has "
                 f"{least / TO_SI[claimed.unit]:.3g} {claimed.unit}; state at least that"
             )
 
