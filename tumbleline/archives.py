@@ -118,7 +118,8 @@ class ArchiveView:
         rows = rows.assign(day=days.astype(float) / 86400.0)
         traces = tuple(
             Trace(f"{axis} {name}", of_term["day"].to_numpy(dtype=float),
-                  (of_term["value"] - of_term["value"].iloc[0]).to_numpy(dtype=float), role=role, error=of_term["U"].to_numpy(dtype=float))
+                  (of_term["value"] - of_term["value"].iloc[0]).to_numpy(dtype=float),
+                  role=role, error=of_term["U"].to_numpy(dtype=float))
             for role, ((axis, name), of_term) in zip(SEVERAL, rows.groupby(["axis", "name"]), strict=False)
         )  # fmt: skip
         title, value = f"{effect} of {unit}", f"change since the first / {rows['unit_text'].iloc[0]}"
