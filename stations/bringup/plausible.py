@@ -29,8 +29,8 @@ def plausible(register: Register, value: Value) -> bool | None:
     if isinstance(value, str):
         return None if not value.strip() else value.isprintable() and value.isascii()
     if isinstance(value, list):
-        judged = [plausible(register.model_copy(update={"count": 1}), one) for one in value]
-        return None if all(one is None for one in judged) else all(one is not False for one in judged)
+        judged = [plausible(register.model_copy(update={"count": 1}), element) for element in value]
+        return None if all(element is None for element in judged) else all(element is not False for element in judged)
     if not math.isfinite(value):
         return False
     if register.enumeration:

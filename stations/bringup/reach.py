@@ -123,16 +123,16 @@ def _settings(device: Device, *, search_line: bool) -> Iterator[Device]:
 
 def _at(link: GatedLink, profile: Profile, device_id: int) -> Answer | None:
     """What answers at one id: at the addresses of the profile, else one beside them or in the other space; None for silence."""
-    own = _read(link, profile, device_id, probes(profile))
-    if own is None:
+    stated = _read(link, profile, device_id, probes(profile))
+    if stated is None:
         return None
-    if own.words and own.votes[1] <= own.votes[0] and len(own.refused) < len(own.words):
-        return own
+    if stated.words and stated.votes[1] <= stated.votes[0] and len(stated.refused) < len(stated.words):
+        return stated
     spaces = {r.space for r in profile.registers}
     others = [*((shift, "") for shift in SHIFTS[1:])]
     if len(spaces) == 1 and (other := OTHER_SPACE.get(next(iter(spaces)))):
         others += [(shift, other) for shift in SHIFTS]
-    tried = [own]
+    tried = [stated]
     for shift, space in others:
         if min(r.address for r in profile.registers) + shift < 0:
             continue
@@ -140,7 +140,7 @@ def _at(link: GatedLink, profile: Profile, device_id: int) -> Answer | None:
         if answer is not None:
             answer.shift, answer.space = shift, space
             tried.append(answer)
-    return max(tried, key=lambda answer: (answer.score, answer is own))
+    return max(tried, key=lambda answer: (answer.score, answer is stated))
 
 
 def _read(link: GatedLink, profile: Profile, device_id: int, registers: Sequence[Register]) -> Answer | None:

@@ -50,8 +50,8 @@ def survey(target: Target, findings: Findings, person: Person) -> Survey:
     if isinstance(values, Registers):
         _groups(values, findings)
     _own_limits(target, found, findings)
-    own = [point for point in findings.points if point.part == "register"]
-    differ = [f"{point.what} ({point.found})" for point in own if point.verdict == "differs"]
+    points = [point for point in findings.points if point.part == "register"]
+    differ = [f"{point.what} ({point.found})" for point in points if point.verdict == "differs"]
     person.tell(
         f"{len(found.values)} values read; "
         + (f"differ: {', '.join(differ)}" if differ else "none differs from its profile")
@@ -119,21 +119,21 @@ def _own_limits(target: Target, found: Survey, findings: Findings) -> None:
     if not target.profile.has("set_point"):
         return
     entry = target.profile.entry("set_point")
-    for name, own, side, sign in (
+    for name, stated, side, sign in (
         ("set_point_low", entry.minimum, "minimum", 1.0),
         ("set_point_high", entry.maximum, "maximum", -1.0),
     ):
         limit = found.values.get(name)
-        if own is None or not isinstance(limit, int | float) or not math.isfinite(limit):
+        if stated is None or not isinstance(limit, int | float) or not math.isfinite(limit):
             continue
         what = f"{side} of set_point"
-        if sign * own < sign * limit:
+        if sign * stated < sign * limit:
             text = f"the controller allows {limit:g} {entry.unit}"
             remedy = "narrow the profile's limit to the controller's, or widen that at its panel"
-            findings.add("register", what, "differs", text, f"{own:g} {entry.unit} of the profile", remedy)
+            findings.add("register", what, "differs", text, f"{stated:g} {entry.unit} of the profile", remedy)
             findings.change("set_point", side, float(limit))
         else:
-            findings.add("register", what, "held", f"{own:g} {entry.unit}", f"inside {limit:g}")
+            findings.add("register", what, "held", f"{stated:g} {entry.unit}", f"inside {limit:g}")
 
 
 def panel(target: Target, findings: Findings, person: Person) -> None:

@@ -90,7 +90,7 @@ def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, 
     if unit not in units:
         raise StationRefused(f"{name}: reference in '{unit}', {' or '.join(units)} is needed; correct the set-up")
     found = ((slot, content[f"slot_{slot}"]) for slot in slots if f"slot_{slot}" in content)
-    outputs = {slot: np.atleast_2d(np.asarray(own, dtype=np.float64)) for slot, own in found}
+    outputs = {slot: np.atleast_2d(np.asarray(channels, dtype=np.float64)) for slot, channels in found}
     reference = np.asarray(content["reference"], dtype=np.float64) / units[unit]
     return Recording(outputs, float(content["rate_hz"]), reference, float(content["reference_rate_hz"]))
 

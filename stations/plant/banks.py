@@ -129,15 +129,15 @@ class LineDevice(Protocol):
 
 @dataclass
 class MemoryBank:
-    """Memory registers of the device in a slot, by the place of the slot."""
+    """Memory registers of the device in a slot, by the index of the slot."""
 
     world: World
-    place: int
+    index: int
 
     @property
     def unit(self) -> int:
         """The unit that is seated in the slot."""
-        return self.world.seats[self.place]
+        return self.world.seats[self.index]
 
     @property
     def flash(self) -> Flash:

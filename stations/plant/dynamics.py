@@ -109,8 +109,8 @@ def two_pole_behind(preset: Preset) -> float:
 
 def directions(axis: int, across_deg: float | None) -> tuple[Array, Array, Array]:
     """Unit vectors (3,) of the driven direction and of the two across it, in the axes of the units."""
-    own, one, two = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+    driven, first, second = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
     if across_deg is None:
-        return own, one, two
+        return driven, first, second
     c, s = math.cos(math.radians(across_deg)), math.sin(math.radians(across_deg))
-    return c * one + s * two, own, c * two - s * one
+    return c * first + s * second, driven, c * second - s * first

@@ -111,10 +111,10 @@ class Fixture:
         hidden: Sequence[HiddenEffect],
         moisture: "Moisture",
     ) -> None:
-        place = stream(sim.seed, "fixture")
+        seating = stream(sim.seed, "fixture")
         low, high = sim.slot_lag_s
-        lag = place.uniform(low, high, 64)[list(slots)]
-        self._gradient = sim.slot_gradient_K * place.standard_normal(64)[list(slots)]
+        lag = seating.uniform(low, high, 64)[list(slots)]
+        self._gradient = sim.slot_gradient_K * seating.standard_normal(64)[list(slots)]
         self._keep = np.exp(-STEP_S / lag)
         self._air_stream = air
         self._unrest = np.zeros(len(slots))

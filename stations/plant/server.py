@@ -109,8 +109,8 @@ def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], blo
         if not bits:
             registers[first - start : first - start + len(values)] = values
             continue
-        for place, value in enumerate(values, first):
-            word, bit = place // WORD - start, place % WORD
+        for position, value in enumerate(values, first):
+            word, bit = position // WORD - start, position % WORD
             if word < len(registers):
                 registers[word] = registers[word] & ~(1 << bit) | value << bit
 

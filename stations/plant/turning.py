@@ -59,10 +59,10 @@ class TurningForce:
         """Change (n, 3) of the vertical, g in the laboratory, by the lean of the turning axis, which goes round twice."""
         outer, inner = self._angles(time)
         zero = np.zeros_like(time)
-        own = self._wobble * self.outer.move.share(time)
-        lean = np.stack([zero, own * np.cos(2.0 * outer), own * np.sin(2.0 * outer)], axis=-1)
-        own = self._wobble * self.inner.move.share(time)
-        a, b = own * np.cos(2.0 * inner), own * np.sin(2.0 * inner)
+        size = self._wobble * self.outer.move.share(time)
+        lean = np.stack([zero, size * np.cos(2.0 * outer), size * np.sin(2.0 * outer)], axis=-1)
+        size = self._wobble * self.inner.move.share(time)
+        a, b = size * np.cos(2.0 * inner), size * np.sin(2.0 * inner)
         lean += np.stack([a, np.cos(outer) * b, np.sin(outer) * b], axis=-1)
         return np.cross(lean, up)
 

@@ -56,4 +56,4 @@ def _one(
     except (Broken, Malformed) as problem:
         failed = f"{type(problem).__name__.lower()}"
     got = replace(exchange, seconds=0.0, reply=reply, failed=failed)
-    return f"{recording.place_of(exchange)}: {exchange.what} -> {said(got, recording.device_of(exchange))}"
+    return f"{recording.name_of(exchange)}: {exchange.what} -> {said(got, recording.device_of(exchange))}"

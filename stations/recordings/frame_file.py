@@ -27,7 +27,7 @@ class RecordedDevice:
 
     link: str
     device_id: int
-    place: str
+    name: str
     profile: Profile | None = None
 
 
@@ -97,15 +97,15 @@ class FrameFile:
 
     def device_of(self, exchange: Exchange) -> RecordedDevice | None:
         """The device of an exchange, where the recording names it."""
-        own = [
+        matching = [
             d for d in self.devices if d.link == exchange.link and (exchange.text or d.device_id == exchange.device_id)
         ]
-        return own[0] if own else None
+        return matching[0] if matching else None
 
-    def place_of(self, exchange: Exchange) -> str:
+    def name_of(self, exchange: Exchange) -> str:
         """The name of the device of an exchange."""
         device = self.device_of(exchange)
-        return f"device {exchange.device_id}" if device is None else device.place
+        return f"device {exchange.device_id}" if device is None else device.name
 
 
 @contextmanager

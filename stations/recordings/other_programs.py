@@ -138,7 +138,7 @@ def _of_packets(path: Path) -> Iterator[Exchange]:
                     address = ".".join(map(str, target[0])) if len(target[0]) == 4 else target[0].hex()
                     pending = _Pending(when, f"{address}:{target[1]}", frame[6], frame[HEADER:])
                     waiting[source, target, frame[:2], frame[6]] = pending
-    found += [one.exchange(zero or 0.0, one.at, None) for one in waiting.values()]
+    found += [pending.exchange(zero or 0.0, pending.at, None) for pending in waiting.values()]
     yield from sorted(found, key=lambda exchange: exchange.at_s)
 
 

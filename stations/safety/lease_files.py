@@ -69,7 +69,8 @@ def _host(name: str) -> str:
     except OSError:  # a name that cannot be resolved now stays the same name
         return name.lower()
     numbers = sorted(
-        (ipaddress.ip_address(address.partition("%")[0]) for address in addresses), key=lambda one: (one.version, one)
+        (ipaddress.ip_address(address.partition("%")[0]) for address in addresses),
+        key=lambda number: (number.version, number),
     )
     if any(number.is_loopback or _is_own(str(number)) for number in numbers):
         return HERE

@@ -44,8 +44,8 @@ class VibrationController(RecordingEquipment):
         self.refuse_sine(frequency, level)
         self.write_all(frequency=frequency, level=level, duration=seconds, axis=float(axis), turn=angle_deg)
         recording = self._run("ACROSS", seconds, slots)
-        turn, (one, two) = np.radians(angle_deg), (recording.reference[:, (axis + k) % 3] for k in (1, 2))
-        self._refuse_wrong_sine(one * np.cos(turn) + two * np.sin(turn), frequency, level)
+        turn, (next_axis, after_next) = np.radians(angle_deg), (recording.reference[:, (axis + k) % 3] for k in (1, 2))
+        self._refuse_wrong_sine(next_axis * np.cos(turn) + after_next * np.sin(turn), frequency, level)
         return recording
 
     def random(self, profile: str, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
