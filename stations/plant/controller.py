@@ -15,7 +15,7 @@ ABSOLUTE = 1  # type of a move
 
 
 def controller_bank(world: World, profile: Profile, registers: Mapping[str, Source], command: Sink) -> Bank:
-    """A bank with the registers ``registers`` and then the common registers of a chamber controller; ``command`` handles writes."""
+    """A bank with the given registers and the common ones of a chamber controller; ``command`` handles writes."""
     chamber = world.fixture.chamber
     point = profile.register("set_point")
     sources: dict[str, Source] = {
