@@ -129,7 +129,7 @@ def read(
     if isinstance(source, pd.DataFrame):
         if is_exchange(source.columns) and not columns:
             past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
-            return _kept(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive, units)
+            return _stored(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive, units)
         return replace(_imported([_as_file(source)], columns, units, serial or "A", archive, stated), command="")
     from pipelines.importers import files
 
@@ -144,11 +144,11 @@ def read(
         beside = history if isinstance(history, str | Path) else ""
         dwells, past, _ = dwells_and_history(str(path), str(beside), None)
         past = checked_history(history, "history", foreign=True) if isinstance(history, pd.DataFrame) else past
-        return _kept(dwells, past, path.name, archive, units)
+        return _stored(dwells, past, path.name, archive, units)
     return _imported([path], columns, units, serial, archive, stated)
 
 
-def _kept(
+def _stored(
     dwells: pd.DataFrame,
     history: pd.DataFrame | None,
     name: str,
@@ -159,10 +159,10 @@ def _kept(
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
     dwells, told = complete_table(dwells, (units or {}).get("output", ""))
-    return Recording(keep_table_of_dwells(dwells, history, name, _place(archive)), told)
+    return Recording(keep_table_of_dwells(dwells, history, name, _archive_address(archive)), told)
 
 
-def _place(archive: str | Path | None) -> str:
+def _archive_address(archive: str | Path | None) -> str:
     return str(session_folder() / "archive") if archive is None else str(archive)
 
 
@@ -204,8 +204,8 @@ def _imported(
             f"rate_hz=…; recognised: {seen.import_command}"
         )
     build(keys, name)
-    done = import_document([*paths], keys, name, "", _place(archive), None, nullcontext)
-    run = Archive(_place(archive)).run(done["run"])
+    done = import_document([*paths], keys, name, "", _archive_address(archive), None, nullcontext)
+    run = Archive(_archive_address(archive)).run(done["run"])
     return Recording(run, _told(seen, proposal, done["remarks"]), Proposal(keys).command(paths))
 
 

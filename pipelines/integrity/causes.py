@@ -28,7 +28,7 @@ def by_cause(
     by_path: dict[str, list[IntegrityFinding]] = {}
     for finding in dict.fromkeys(findings):
         by_path.setdefault(finding.path, []).append(finding)
-    causes = {path: _one(group) for path, group in by_path.items()}
+    causes = {path: _joined(group) for path, group in by_path.items()}
     for folder, paths in _gone(causes, root).items():
         if len(paths) >= FEWEST_GONE:
             cause = IntegrityFinding(MISSING, folder, f"is missing, {len(paths)} of its files are named elsewhere")
@@ -85,7 +85,7 @@ def _by_folder(
             causes[paths[0]] = _with(replace(first, message=first.message + also), others)
 
 
-def _one(findings: list[IntegrityFinding]) -> IntegrityFinding:
+def _joined(findings: list[IntegrityFinding]) -> IntegrityFinding:
     """The findings of one path as one: an invalid signature first, then the first finding."""
     first = min(findings, key=lambda finding: finding.kind != SIGNATURE)
     return _with(first, [finding for finding in findings if finding is not first])

@@ -92,7 +92,7 @@ class _Archived:
         change = change_of(np.stack([b.values - a.values for a, b in pairs]), both)
         again = [unit for unit in self.units if unit in lot]
         self.groups = {unit: group for unit, group in self.groups.items() if unit not in again}
-        of_units = {unit: self._own(found, self.units[unit][-1], change, days.mean()) for unit in again}
+        of_units = {unit: self._by_last_calibration(found, self.units[unit][-1], change, days.mean()) for unit in again}
         return replace(found, own={**of_groups, **of_units})
 
     def _of_groups(
@@ -112,7 +112,7 @@ class _Archived:
         return {unit: groups.of(named[unit]) for unit in self.groups}
 
     @staticmethod
-    def _own(found: Family, last: _Calibrated, change: Array, days: float) -> tuple[Array, Array]:
+    def _by_last_calibration(found: Family, last: _Calibrated, change: Array, days: float) -> tuple[Array, Array]:
         """Mean and covariance of a unit by its last calibration: its change grows with time, as a walk does."""
         past = max(1.0, (datetime.now(UTC).timestamp() / DAY_S - last.day) / max(days, 1.0 / DAY_S))
         both = combined(last.values, last.covariance, found.mean, found.precision)

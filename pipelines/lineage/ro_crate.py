@@ -81,7 +81,7 @@ def _contents(archive: Archive, graph: Graph) -> dict[str, bytes]:
     traced = {name: (archive.root / name).read_bytes() for name in sorted(names) if (archive.root / name).is_file()}
     for node in graph.nodes.values():
         if node.kind in SETTINGS:
-            traced[_place(node)] = files.json_bytes(node.about)
+            traced[_crate_path(node)] = files.json_bytes(node.about)
     return traced
 
 
@@ -175,7 +175,7 @@ def _program(software: dict[str, Any]) -> str:
     return "#" + quote("-".join(f"{name}-{number}" for name, number in sorted(software.items())))
 
 
-def _place(node: Node) -> str:
+def _crate_path(node: Node) -> str:
     """Path of a node in the crate; empty for a node without a file there."""
     if node.kind in SETTINGS:
         return f"settings/{quote(node.id.replace(':', '-', 1), safe=' @')}.json"  # names of settings may have any character
@@ -183,4 +183,4 @@ def _place(node: Node) -> str:
 
 
 def _id(node: Node) -> str:
-    return quote(_place(node)) or f"#{quote(node.id)}"
+    return quote(_crate_path(node)) or f"#{quote(node.id)}"

@@ -46,7 +46,7 @@ def survey(target: Target, findings: Findings, person: Person) -> Survey:
         if isinstance(entry, Register) and entry.access == "write":
             findings.add("register", entry.name, "not tried", "write only")
             continue
-        values = _one(target, values, entry, found, findings)
+        values = _read(target, values, entry, found, findings)
     if isinstance(values, Registers):
         _groups(values, findings)
     _own_limits(target, found, findings)
@@ -59,7 +59,7 @@ def survey(target: Target, findings: Findings, person: Person) -> Survey:
     return found
 
 
-def _one(target: Target, values: Values, entry: Register | Command, found: Survey, findings: Findings) -> Values:
+def _read(target: Target, values: Values, entry: Register | Command, found: Survey, findings: Findings) -> Values:
     """Reads one value; the values on a new connection where the old one was lost."""
     name = entry.name
     begun = time.monotonic()

@@ -65,10 +65,10 @@ def _stated(row: Mapping[str, Any], terms: BudgetTerms) -> dict[str, Entry]:
 
 def _contributions(row: Mapping[str, Any], terms: BudgetTerms) -> Iterator[dict[str, Any]]:
     """The contributions to one result, without those that are exactly 0."""
-    yield _own("record_noise", float(row["u_noise"]), "A", float(row["dof"]), "the records of the procedure")
+    yield _row_of_unit("record_noise", float(row["u_noise"]), "A", float(row["dof"]), "the records of the procedure")
     for name, source in OF_RECIPE.items():
         if row[f"u_{name}"] > 0.0:
-            yield _own(name, float(row[f"u_{name}"]), "B", float("inf"), source)
+            yield _row_of_unit(name, float(row[f"u_{name}"]), "B", float("inf"), source)
     known = _stated(row, terms)
     for name in (name for name in TERMS if row[f"c_{name}"] != 0.0 and name in known):
         entry, sensitivity = known[name], abs(float(row[f"c_{name}"]))
@@ -86,7 +86,7 @@ def _contributions(row: Mapping[str, Any], terms: BudgetTerms) -> Iterator[dict[
             }  # fmt: skip
 
 
-def _own(name: str, u: float, kind: str, dof: float, source: str) -> dict[str, Any]:
+def _row_of_unit(name: str, u: float, kind: str, dof: float, source: str) -> dict[str, Any]:
     return {
         "contribution": name, "type": kind, "distribution": "normal", "scope": "unit", "input_unit": "", "source": source,
         "u": u, "divisor": 1.0, "stated": u, "dof": dof, "visible": float("nan"), "sensitivity": 1.0,

@@ -62,10 +62,10 @@ def norm_dwells(
             coefficients=calibration.coefficients[[index]],
             covariance=calibration.covariance[[index]],
         )
-        yield _one(rows.sort_values("dwell"), past, of_unit, wander[wander["unit"].astype(str) == unit])
+        yield _norm_dwells(rows.sort_values("dwell"), past, of_unit, wander[wander["unit"].astype(str) == unit])
 
 
-def _one(
+def _norm_dwells(
     dwells: pd.DataFrame, history: pd.DataFrame | None, calibration: Calibration, wander: pd.DataFrame
 ) -> NormDwells:
     measurement = measured(dwells, history)
