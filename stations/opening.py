@@ -201,8 +201,8 @@ def _axis(
         tighter((0.0, wanted), profile, name if profile.has(name) else f"{which}_{name}")[1]
         for name, wanted in (("speed", limits.speed_deg_s), ("acceleration", limits.acceleration_deg_s2))
     )
-    kept = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
-    return adapter_of(profile, "axis", TableAxis)(registers, tighter(bounds, profile, "target"), kept, which)
+    allowed = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
+    return adapter_of(profile, "axis", TableAxis)(registers, tighter(bounds, profile, "target"), allowed, which)
 
 
 def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[float, float]:

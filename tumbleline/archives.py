@@ -86,7 +86,7 @@ class ArchiveView:
 
         document = discovered(self.store, Look(device=device)).document
         rows = [*document["discoveries"], *document["unexplained"]]
-        kept = (
+        columns = (
             "id",
             "since",
             "recommended",
@@ -99,7 +99,7 @@ class ArchiveView:
             "effects",
             "drivers",
         )
-        return pd.DataFrame([{name: row.get(name) for name in kept} for row in rows], columns=list(kept))
+        return pd.DataFrame([{name: row.get(name) for name in columns} for row in rows], columns=list(columns))
 
     def plot(self, unit: str, effect: str = "bias") -> Picture:
         """Change of a unit's coefficients of an effect since they were measured first, with U (k = 2) as bars, by day."""

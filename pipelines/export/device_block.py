@@ -105,9 +105,9 @@ def block_of(
     moved = replace(unit, bias=bias)
     shared = (form, sequence, unit.unit, certificate, date, unit.temperatures)
     if form == "q24":
-        whole = fixed_point(moved)
-        exact = [v.astype(np.float64) for v in (whole.bias, whole.inverse)]
-        return CoefficientBlock(*shared, whole.scale, offsets, *exact)
+        fixed = fixed_point(moved)
+        exact = [v.astype(np.float64) for v in (fixed.bias, fixed.inverse)]
+        return CoefficientBlock(*shared, fixed.scale, offsets, *exact)
     exact = [v.astype(np.float32).astype(np.float64) for v in (moved.bias, moved.response)]
     return CoefficientBlock(*shared, 0.0, offsets, *exact)
 

@@ -136,14 +136,14 @@ def read_state(path: Path, unit: str) -> Kept | None:
         return None
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        kept = _kept(content)
+        state = _kept(content)
     except (ValueError, KeyError, TypeError, UnicodeDecodeError):
         raise DataRejected(
             f"{path.name}: not the state that 'tumbleline correct --state' keeps, one is needed; name another file"
         ) from None
-    if kept.unit != unit:
-        raise DataRejected(f"{path.name}: the state of unit {kept.unit}, that of {unit} is needed; name another file")
-    return kept
+    if state.unit != unit:
+        raise DataRejected(f"{path.name}: the state of unit {state.unit}, that of {unit} is needed; name another file")
+    return state
 
 
 def _kept(content: dict[str, Any]) -> Kept:
@@ -163,15 +163,15 @@ def _kept(content: dict[str, Any]) -> Kept:
     return Kept(str(content["unit"]), float(content["time_s"]), passed, followed)
 
 
-def write_state(path: Path, kept: Kept) -> None:
+def write_state(path: Path, state: Kept) -> None:
     """Keep the state; the numbers are written so that they are read back bit for bit.
 
     The names of its keys are those of the attributes of filter, bias and flicker: whoever renames one changes the file's format.
     """
-    low_pass, track = kept.filter, kept.track
+    low_pass, track = state.filter, state.track
     content = {
-        "unit": kept.unit,
-        "time_s": kept.time_s,
+        "unit": state.unit,
+        "time_s": state.time_s,
         "filter": None if low_pass is None else _plain(vars(low_pass[0]) | {"state": low_pass[1]}),
         "track": None if track is None else _plain({"time_s": track.time_s} | vars(track.state) | vars(track.flicker)),
     }

@@ -79,9 +79,9 @@ class UnitCalibration:
 
     def with_forces(self, output: Array, force: Array) -> Array:
         """Outputs (3,) of :attr:`with_every_axis`, from those of the axes that have one, under a known force (3,), g."""
-        whole = np.array(force, dtype=np.float64)
-        whole[list(self.axes)] = output
-        return whole
+        outputs = np.array(force, dtype=np.float64)
+        outputs[list(self.axes)] = output
+        return outputs
 
     @property
     def certified(self) -> str:

@@ -207,8 +207,8 @@ def _letters(text: str) -> int:
 
 def _packed(parts: Iterable[tuple[int, int]]) -> bytes:
     """Values of some bits each, one after another."""
-    whole = at = 0
+    packed = at = 0
     for value, bits in parts:
-        whole |= value << at
+        packed |= value << at
         at += bits
-    return whole.to_bytes(-(-at // 8), "little")
+    return packed.to_bytes(-(-at // 8), "little")

@@ -169,10 +169,10 @@ def simulation_document(
     made: SimulatedOutput, fit: FitOfUnit, low_pass: OutputFilter | None, seed: int | None, output: Path
 ) -> SimulateDocument:
     """What was simulated."""
-    unit, whole = fit.exported, fit.exported.with_every_axis
+    unit, full = fit.exported, fit.exported.with_every_axis
     output_of_all = made.force.copy()
     output_of_all[:, list(unit.axes)] = made.output
-    error = (np.linalg.solve(whole.response[0], (output_of_all - whole.bias[0]).T).T - made.force)[:, list(unit.axes)]
+    error = (np.linalg.solve(full.response[0], (output_of_all - full.bias[0]).T).T - made.force)[:, list(unit.axes)]
     return {
         "file": made.recording.name,
         "run": fit.run,

@@ -83,14 +83,14 @@ def mended(output: Array, faults: SampleFaults, bad: Flags) -> Array:
 
 def without_short(intervals: Stretches, record: Index) -> tuple[Stretches, Index, tuple[str, ...]]:
     """The dwells that keep at least half of their samples, renumbered, and a remark on the others."""
-    kept = [k for k, (a, b) in enumerate(intervals.spans) if 2 * np.count_nonzero(record[a:b]) > b - a]
-    if len(kept) == len(intervals):
+    sound = [k for k, (a, b) in enumerate(intervals.spans) if 2 * np.count_nonzero(record[a:b]) > b - a]
+    if len(sound) == len(intervals):
         return intervals, record, ()
     numbers = np.zeros(len(intervals) + 1, dtype=np.int64)
-    numbers[np.array(kept, dtype=np.int64) + 1] = np.arange(len(kept)) + 1
-    gone = [intervals.labels[k] for k in range(len(intervals)) if k not in set(kept)]
+    numbers[np.array(sound, dtype=np.int64) + 1] = np.arange(len(sound)) + 1
+    gone = [intervals.labels[k] for k in range(len(intervals)) if k not in set(sound)]
     remark = f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_LISTED])}"
-    return intervals.only(kept), numbers[record], (remark,)
+    return intervals.only(sound), numbers[record], (remark,)
 
 
 def sound_dwells(
@@ -137,9 +137,9 @@ def refuse_or_remark(faults: SampleFaults, output: Array, time: Array, mapping: 
     if not faults:
         return ()
     words = "; ".join(faults.sentences(time))
-    whole = [stretch for stretch in faults.frozen if stretch.count == len(output)]
-    if whole and mapping.faulty != "keep":
-        axis = AXES[whole[0].axis]
+    constant = [stretch for stretch in faults.frozen if stretch.count == len(output)]
+    if constant and mapping.faulty != "keep":
+        axis = AXES[constant[0].axis]
         raise DataRejected(
             f"{where}: axis {axis} never changes in {len(output)} samples while another axis does; map another column as "
             f"{axis}, repair the sensor's channel, or import it all the same with --set faulty=keep"

@@ -64,8 +64,8 @@ def _after(contents: Sequence[Content], names: list[str], time: str) -> tuple[Co
         if shifted:
             remarks.append(f"{name}: its clock restarts; it is continued after {names[len(tables) - 1]}")
         tables.append(table)
-    whole = all(content.lines for content in contents)
-    lines = tuple(part for content in contents for part in content.lines) if whole else ()
+    numbered = all(content.lines for content in contents)
+    lines = tuple(part for content in contents for part in content.lines) if numbered else ()
     table = pd.concat(tables, ignore_index=True)
     return replace(first, table=table, remarks=tuple(remarks), lines=lines), tuple(breaks[1:])
 

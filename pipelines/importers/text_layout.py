@@ -107,8 +107,8 @@ def layout(lines: Sequence[str], filled: Sequence[int]) -> Layout | None:
         first = filled[index + 1]
     elif not above or first > 0:
         names = _commented(lines, first, divider, width)
-    kept = width - 1 if trailing else width
-    return Layout(divider, decimal, first, names[:kept], header, integers, units[:kept], kept, trailing)
+    count = width - 1 if trailing else width
+    return Layout(divider, decimal, first, names[:count], header, integers, units[:count], count, trailing)
 
 
 def _sampled(filled: list[str]) -> list[str]:

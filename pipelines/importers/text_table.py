@@ -93,9 +93,9 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     units = {label: unit.strip("[]() ") for label, unit in zip(labels, stated, strict=False) if unit}
     remarks = (*_remarks(detected, lines, encoding), *([grouped] if grouped else []))
     # a line break inside a quoted field, or one that the parser joins, moves all rows behind it
-    whole = len(lines) == len(text.splitlines()) and len(rows) == len(table)
+    line_by_line = len(lines) == len(text.splitlines()) and len(rows) == len(table)
     interval, stated_by = _stated_interval(lines[: detected.first])
-    return Content(table, (*remarks, *stated_by), units, interval, ((where, rows),) if whole else ())
+    return Content(table, (*remarks, *stated_by), units, interval, ((where, rows),) if line_by_line else ())
 
 
 def _stated_interval(lines: Sequence[str]) -> tuple[float | None, tuple[str, ...]]:
@@ -266,8 +266,8 @@ def _is_separator(sign: str, rows: Sequence[Sequence[str]]) -> bool:
 
 def _mixed(column: Sequence[str], grouped: re.Pattern[str]) -> bool:
     """Whether a column has grouped numbers, and whole numbers, which are all below a thousand."""
-    whole = [abs(int(word)) for word in column if re.fullmatch(r"[+-]?\d{1,12}", word)]
-    return any(whole) and max(whole) < 1000 and any(grouped.fullmatch(word) for word in column)
+    ungrouped = [abs(int(word)) for word in column if re.fullmatch(r"[+-]?\d{1,12}", word)]
+    return any(ungrouped) and max(ungrouped) < 1000 and any(grouped.fullmatch(word) for word in column)
 
 
 def _cleaned(line: str, divider: str, sign: str, grouped: re.Pattern[str]) -> str:

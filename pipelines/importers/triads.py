@@ -204,8 +204,8 @@ def _fitted(parts: Array, output: Array) -> Sphere:
         radius = unit * float(np.sqrt(max(solved[3] + np.sum(solved[:3] ** 2), 1e-12)))
         away = np.abs(np.linalg.norm(parts - centre, axis=1) - radius)
         used = parts[away <= np.quantile(away, 1.0 - _LEFT_OUT)]
-    kept = np.sort(away)[: max(4, int(np.ceil((1.0 - _LEFT_OUT) * len(away))))]
-    misfit = float(np.sqrt(np.mean(kept**2))) / radius
+    nearest = np.sort(away)[: max(4, int(np.ceil((1.0 - _LEFT_OUT) * len(away))))]
+    misfit = float(np.sqrt(np.mean(nearest**2))) / radius
     found = Sphere(radius, centre, misfit, np.sort(np.ptp(used, axis=0)) / radius, jumps / radius)
     if found.fits and (found.spans[0] > 1.0 or not one_pose):
         return found
@@ -236,9 +236,9 @@ def _shows_gravity(sphere: Sphere, columns: Mapping[str, Array], names: Sequence
     if not sphere.still:
         return len(columns[names[0]]) < 7 and bool(unit_check.looks_like(sphere.radius))
     output = np.column_stack([columns[name] for name in names])
-    whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
+    integers = bool(np.all(output[:1000] == np.rint(output[:1000])))
     clear = sphere.radius > max(_CLEAR_COUNTS, _CLEAR_RATIO * float(np.linalg.norm(np.nanstd(output, axis=0))))
-    return bool(sphere.gravity) or (whole and clear)
+    return bool(sphere.gravity) or (integers and clear)
 
 
 def _lettered(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:

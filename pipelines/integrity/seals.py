@@ -174,8 +174,8 @@ def _check_evidence(path: Place, checked: VerifiedPart) -> None:
     except ArchiveUnusable:
         checked.wrong(UNREADABLE, path, "is not a readable manifest")
         return
-    kept = {name: value for name, value in content.items() if name not in {*provenance(), ENTRY}}
-    if path.stem != f"{str(kept.get('model'))[:10]}-{digest(kept)[:10]}":
+    evidence = {name: value for name, value in content.items() if name not in {*provenance(), ENTRY}}
+    if path.stem != f"{str(evidence.get('model'))[:10]}-{digest(evidence)[:10]}":
         checked.wrong(EDITED, path, "was edited: its name does not agree with its content")
 
 

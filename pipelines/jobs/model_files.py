@@ -83,8 +83,8 @@ def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
 
 def use_formulas_of(run: Run) -> None:
     """Add the formulas of the model of an archived run to the catalogue of effects."""
-    kept = run.about.get("recipe", {}).get("formulas", [])
-    use_formulas([FormulaSpec.model_validate(spec) for spec in kept], f"run {run.id}")
+    formulas = run.about.get("recipe", {}).get("formulas", [])
+    use_formulas([FormulaSpec.model_validate(spec) for spec in formulas], f"run {run.id}")
 
 
 def refuse_unknown_effects(names: Sequence[str], where: str) -> None:

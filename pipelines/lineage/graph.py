@@ -83,11 +83,11 @@ class Graph:
         up, steps_up = self._reached(start, forward=False)
         down, steps_down = self._reached(start, forward=True)
         beside = {node for name in steps_down for node in self.steps[name].used} & self.nodes.keys()
-        kept = up | down | {node for node in beside if self.nodes[node].kind in {"recipe", "limits", "station"}}
-        part = Graph({name: node for name, node in self.nodes.items() if name in kept})
+        names = up | down | {node for node in beside if self.nodes[node].kind in {"recipe", "limits", "station"}}
+        part = Graph({name: node for name, node in self.nodes.items() if name in names})
         reached = steps_up | steps_down
         for step in (step for name, step in self.steps.items() if name in reached):
-            used, made = (tuple(node for node in nodes if node in kept) for nodes in (step.used, step.made))
+            used, made = (tuple(node for node in nodes if node in names) for nodes in (step.used, step.made))
             part.put(replace(step, used=used, made=made))
         return part
 

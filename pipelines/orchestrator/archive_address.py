@@ -84,9 +84,9 @@ def without_credentials(address: str) -> str:
     if at and user not in HARMLESS:
         authority = host
     pairs = parse_qsl(query, keep_blank_values=True)
-    kept = [(name, value) for name, value in pairs if name in NO_SECRET or not SECRET.search(name)]
-    if len(kept) != len(pairs):
-        query = urlencode(kept, quote_via=quote, safe="/:,")
+    harmless = [(name, value) for name, value in pairs if name in NO_SECRET or not SECRET.search(name)]
+    if len(harmless) != len(pairs):
+        query = urlencode(harmless, quote_via=quote, safe="/:,")
         question = "?" if query else ""
     return f"{scheme}://{authority}{slash}{path}{question}{query}"
 

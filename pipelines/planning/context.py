@@ -75,10 +75,10 @@ def plan_context(
             "recipe are made; list it, or see station time and figures of the procedures with 'tumbleline plan'",
             key="procedures",
         )
-    whole = schedule(steps(recipe), station, recipe)
-    state = state_of(whole, station, recipe, history=True)
+    activities = schedule(steps(recipe), station, recipe)
+    state = state_of(activities, station, recipe, history=True)
     covariance = dwell_covariance(state.time, recipe.dwell_s, noise, slowest=slowest)
-    return PlanContext(recipe, station, noise, whole, state, covariance, prior)
+    return PlanContext(recipe, station, noise, activities, state, covariance, prior)
 
 
 def shown_by_verification(

@@ -83,14 +83,14 @@ def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
     users = [k for k, of_phase in enumerate(places) if of_phase]
     made: list[Stay] = []
     for k, resources in enumerate(needed):
-        kept = [resource for resource in resources if k and resource in needed[k - 1]]
-        new = [resource for resource in resources if resource not in kept]
+        held = [resource for resource in resources if k and resource in needed[k - 1]]
+        new = [resource for resource in resources if resource not in held]
         if len(line.fixtures) == 1:  # it stays where it is, and each lot ends on what the next begins on
             there = places[users[users.index(k) - 1]] if k in users else []
             new = [resource for resource in places[k] if resource not in there]
         change = max((step_count(60.0 * resource.change_min) for resource in new), default=0)
         by_hand = any(resource.by_hand and resource.change_min for resource in new)
-        made.append(Stay(_names(resources), _names(kept), _names(new), change, by_hand))
+        made.append(Stay(_names(resources), _names(held), _names(new), change, by_hand))
     return made
 
 

@@ -66,12 +66,12 @@ def reference_errors(against: PlanContext, recipe: Recipe) -> Array:
 
 def _hidden(state: State, model: Sequence[str]) -> list[str]:
     """Effects of a model that a plan cannot identify beside the effects before them."""
-    kept: list[str] = []
+    visible: list[str] = []
     for effect in model:
-        visibility = visibilities(state, kept, 1.0, [effect])
+        visibility = visibilities(state, visible, 1.0, [effect])
         if effect in ("bias", "scale", "misalignment") or (visibility and visibility[0].seen):
-            kept.append(effect)
-    return [effect for effect in model if effect not in kept]
+            visible.append(effect)
+    return [effect for effect in model if effect not in visible]
 
 
 def seen_by(against: PlanContext, levels: Sequence[float]) -> tuple[str, ...]:

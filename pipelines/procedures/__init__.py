@@ -202,19 +202,19 @@ def refuse_unusable(recipe: Recipe, station: StationConfig) -> None:
 
 EMPTY: dict[str, dict[str, str]] = {
     "procedure_points": {
-        "texts": "unit procedure axis series", "numbers": "setting value uncertainty", "whole": "number point",
+        "texts": "unit procedure axis series", "numbers": "setting value uncertainty", "integers": "number point",
     },
     "procedure_figures": {
         "texts": "unit procedure figure axis unit_text note", "numbers": "value uncertainty low high dof removed",
-        "whole": "number", "flags": "identified",
+        "integers": "number", "flags": "identified",
     },
-    "procedure_findings": {"texts": "unit procedure subject text", "whole": "number"},
+    "procedure_findings": {"texts": "unit procedure subject text", "integers": "number"},
     "procedure_results": {
-        "texts": "unit procedure role quantity axis unit_text", "whole": "number point",
+        "texts": "unit procedure role quantity axis unit_text", "integers": "number point",
         "numbers": " ".join(("setting value dof", *(f"u_{name}" for name in OF_RECORDS), *(f"c_{name}" for name in TERMS))),
     },
     "procedure_curves": {
-        "texts": "unit procedure axis model verdict reason name", "whole": "number row column",
+        "texts": "unit procedure axis model verdict reason name", "integers": "number row column",
         "numbers": "value p_value low_hz high_hz",
     },
 }  # fmt: skip

@@ -94,11 +94,11 @@ def response_results(part: Any, rows: pd.DataFrame, out_unit: str) -> list[Compa
     Motion across the axis acts by the transverse sensitivity of the unit, at most ``transverse_percent``: with both rectangular
     and their angle uniform its standard uncertainty is that of the motion times the largest sensitivity over √6.
     """
-    kept = rows[np.isfinite(rows["value"])]
+    measured = rows[np.isfinite(rows["value"])]
     share = 1e-2 * part.transverse_percent / np.sqrt(6.0)
     repeated, turned = 1e-2 * part.repeatability_percent, part.repeatability_deg
     results: list[ComparedResult] = []
-    for row in rows_of(kept):
+    for row in rows_of(measured):
         value, across = float(row["value"]), share * 1e-2 * float(row["transverse_percent"])
         noise = without(float(row["uncertainty"]) / value, repeated, across)
         about: dict[str, Any] = {"axis": str(row["axis"]), "point": int(row["point"]), "setting": float(row["setting"])}
@@ -171,6 +171,6 @@ def verdict_word(verdict: bool | None) -> str:  # noqa: FBT001 - it is the verdi
     return NOT_JUDGED if verdict is None else ADEQUATE if verdict else NOT_ADEQUATE
 
 
-def without(whole: float, *parts: float) -> float:
+def without(total: float, *parts: float) -> float:
     """What remains of a standard uncertainty without some of its parts."""
-    return float(np.sqrt(max(0.0, whole**2 - sum(part**2 for part in parts))))
+    return float(np.sqrt(max(0.0, total**2 - sum(part**2 for part in parts))))

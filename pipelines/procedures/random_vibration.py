@@ -178,11 +178,11 @@ class RandomVibration(InG, OnEquipment, Compares):
         slope = figures[self.figures[0].name]
         first = ComparedResult("vibration_rectification", part.axis, "µg/g²", slope.value, {"noise": slope.uncertainty},
                                by_share(2.0 * abs(slope.value)))  # fmt: skip
-        kept = rows[(rows["series"] == "response") & np.isfinite(rows["value"])]
-        if len(kept) < FEWEST_POINTS:
+        response = rows[(rows["series"] == "response") & np.isfinite(rows["value"])]
+        if len(response) < FEWEST_POINTS:
             return [first], []
         try:
-            results, curves = transfer_results(part, _diagnosis(part, kept), kept, out_unit)
+            results, curves = transfer_results(part, _diagnosis(part, response), response, out_unit)
         except NotIdentified:
             return [first], []
         return [first, *results], curves
@@ -272,16 +272,16 @@ def _diagnosis(part: RandomVibrationPart, response: pd.DataFrame) -> TransferDia
 def _transfer(part: RandomVibrationPart, response: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:
     """Figures and findings of the transfer function, judged as that of a sweep."""
     names = ("random_bandwidth_hz", "random_natural_hz", "random_damping")
-    kept = response[np.isfinite(response["value"])]
-    note = f"{len(kept)} bands follow the vibration, {FEWEST_POINTS} are needed; check cable and range"
-    if len(kept) >= FEWEST_POINTS:
+    measured = response[np.isfinite(response["value"])]
+    note = f"{len(measured)} bands follow the vibration, {FEWEST_POINTS} are needed; check cable and range"
+    if len(measured) >= FEWEST_POINTS:
         try:
-            diagnosis = _diagnosis(part, kept)
+            diagnosis = _diagnosis(part, measured)
         except NotIdentified as problem:
             note = str(problem)
         else:
-            made = figures_of_model(part.axis, diagnosis, transfer_points(kept), "random")
-            return made, [*diagnosis_text(diagnosis), *condition_texts(kept)]
+            made = figures_of_model(part.axis, diagnosis, transfer_points(measured), "random")
+            return made, [*diagnosis_text(diagnosis), *condition_texts(measured)]
     return [FigureValue.not_determined(name, part.axis, note) for name in names], []
 
 
@@ -320,9 +320,9 @@ def _density(unit: str, axis: str, driven: np.ndarray, rate_hz: float) -> list[d
 def _target(part: RandomVibrationPart, points: pd.DataFrame, f: np.ndarray) -> np.ndarray:
     """The ordered density at the largest level."""
     profile = np.array(load_vibration_profile(part.profile).breakpoints)
-    whole = overall_level(profile[:, 0], profile[:, 1])
+    nominal = overall_level(profile[:, 0], profile[:, 1])
     level = float(points.loc[points["series"] == "shift", "ordered_g"].iloc[-1])
-    return interpolated(f, profile[:, 0], profile[:, 1]) * (level / whole) ** 2
+    return interpolated(f, profile[:, 0], profile[:, 1]) * (level / nominal) ** 2
 
 
 PROCEDURE = RandomVibration()

@@ -196,7 +196,9 @@ def point_table(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     """Points from rows with unit, axis, series, point, setting, value, uncertainty and further numbers."""
     made = pd.DataFrame(list(rows))
     return (
-        made if len(made) else empty_table(texts="unit axis series", whole="point", numbers="setting value uncertainty")
+        made
+        if len(made)
+        else empty_table(texts="unit axis series", integers="point", numbers="setting value uncertainty")
     )
 
 

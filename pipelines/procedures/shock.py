@@ -291,9 +291,9 @@ def compared_results(part: ShockPart, figures: Mapping[str, FigureValue], shocks
     if ratio is None:
         return []
     dof = float(shocks - 1) if shocks > 1 else float("inf")
-    whole = 100.0 + ratio.value
-    terms = by_share(whole, ("reference", "drift", "amplitude", "mounting"))
-    terms["transverse"] = 1e-2 * part.transverse_percent / np.sqrt(6.0) * whole
+    percent = 100.0 + ratio.value
+    terms = by_share(percent, ("reference", "drift", "amplitude", "mounting"))
+    terms["transverse"] = 1e-2 * part.transverse_percent / np.sqrt(6.0) * percent
     noise = {"noise": without(ratio.uncertainty, part.reference_percent)}
     results = [ComparedResult("shock_sensitivity", part.axis, "%", ratio.value, noise, terms, dof=dof)]
     for name in RELATIVE:

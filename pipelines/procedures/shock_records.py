@@ -127,11 +127,11 @@ _last_judged: dict[bytes, ShockDiagnosis] = {}
 
 def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
     """The diagnosis of the first shock in each direction; None where no waveforms are kept."""
-    kept = rows[rows["series"] == "compared"]
+    waveforms = rows[rows["series"] == "compared"]
     shocks: list[Waves] = []
     duration = 1e-3 * part.duration_ms
     before, rate = 0.0, PER_PULSE / duration
-    for _, shock in kept.groupby("direction", sort=False):
+    for _, shock in waveforms.groupby("direction", sort=False):
         first = shock[shock["shock"] == shock["shock"].iloc[0]]
         reference, unit, error = numbers(first, "reference_g", "value", "uncertainty")
         shocks.append(Waves(reference, unit, error))

@@ -119,7 +119,7 @@ class StepResponse(OnEquipment, FromWaveforms):
 
     def chart(self, part: StepPart, points: pd.DataFrame) -> Chart:
         """The response of every axis, and its last part about the final value with the band and the settling times."""
-        whole: list[Trace] = []
+        full: list[Trace] = []
         last: list[Trace] = []
         settled = float("nan")
         most = 5.0 * part.band_percent
@@ -129,7 +129,7 @@ class StepResponse(OnEquipment, FromWaveforms):
                 1e3 * response["setting"].to_numpy(dtype=float),
                 100.0 * response["value"].to_numpy(dtype=float),
             )
-            whole.append(Trace(f"axis {axis}", time, value, "line", axis, width=width))
+            full.append(Trace(f"axis {axis}", time, value, "line", axis, width=width))
             last.append(Trace(f"axis {axis}", time, value - 100.0, "line", axis, width=width))
             try:
                 settled = 1e3 * axis_figures(part, response).settling_s
@@ -138,12 +138,12 @@ class StepResponse(OnEquipment, FromWaveforms):
             last.append(
                 Trace("", np.full(2, settled), np.array([-most, most]), "line", axis, dashed=True, legend=False)
             )
-        end = max(float(trace.x.max()) for trace in whole)
+        end = max(float(trace.x.max()) for trace in full)
         edges = ((-1.0 * settled, 5.0 * settled), (0.0, 4.0 * settled)) if np.isfinite(settled) else ((None, None),) * 2
         label = "time from the edge of the drive / ms"
         band = between(np.array([0.0, end]), -part.band_percent, part.band_percent, f"band ± {part.band_percent:g} %")
         left = Plot(
-            "", PlotAxis(label, low=edges[0][0], high=edges[0][1]), PlotAxis("response / % of the step"), (*whole,)
+            "", PlotAxis(label, low=edges[0][0], high=edges[0][1]), PlotAxis("response / % of the step"), (*full,)
         )
         right = Plot(
             "dashed: settling time",
@@ -163,15 +163,15 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
     """Figures of one axis from its averaged response."""
     if bool((rows["fault"] > 0.0).any()):
         raise NotIdentified(FAULTS[int(rows["fault"].iloc[0])])
-    kept = rows.sort_values("setting")
-    time, value, error = numbers(kept)
-    rate = float(kept["rate_hz"].iloc[0])
+    response = rows.sort_values("setting")
+    time, value, error = numbers(response)
+    rate = float(response["rate_hz"].iloc[0])
     figures = step_figures(
         time,
         value,
         error,
         band=1e-2 * part.band_percent,
-        edge_error_s=float(kept["edge_error_s"].iloc[0]),
+        edge_error_s=float(response["edge_error_s"].iloc[0]),
         bin_s=1.0 / rate / BINS,
     )
     samples = figures.rise_s * rate

@@ -140,8 +140,8 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         wave = reference.output[:, [axis]] - reference.output[:, axis].mean()
         spectrum = np.abs(np.fft.rfft(wave[:, 0] * np.hanning(len(wave))))
         line = int(np.argmax(spectrum[1:])) + 1
-        tone_power, whole = np.sum(spectrum[max(line - 2, 1) : line + 3] ** 2), np.sum(spectrum[1:] ** 2)
-        if tone_power < SINGLE_TONE * whole:
+        tone_power, power = np.sum(spectrum[max(line - 2, 1) : line + 3] ** 2), np.sum(spectrum[1:] ** 2)
+        if tone_power < SINGLE_TONE * power:
             return {"frequency_hz": np.nan, "level_g": float(np.std(wave)), "axis": float(axis)}
         coarse = float(line) * reference.rate_hz / len(wave)
         tone = fit_tone_and_frequency(wave, reference.rate_hz, coarse)
@@ -175,37 +175,39 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
 
     def of_unit(self, part: SweepPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The model, judged; figures of the adequate model, or as not determined with the reason."""
-        kept = rows[np.isfinite(rows["value"])]
+        measured = rows[np.isfinite(rows["value"])]
         texts: list[tuple[str, str]] = []
-        if len(kept) < len(rows):
-            text = f"{len(rows) - len(kept)} of {len(rows)} points give no tone, or are clipped: they are left out"
+        if len(measured) < len(rows):
+            text = f"{len(rows) - len(measured)} of {len(rows)} points give no tone, or are clipped: they are left out"
             texts.append(("points without a value", text))
-        if len(kept) < max(FEWEST_POINTS, 0.8 * len(rows)):
-            note = f"{len(kept)} of {len(rows)} points have a value, four fifths are needed; check cable and range"
+        if len(measured) < max(FEWEST_POINTS, 0.8 * len(rows)):
+            note = f"{len(measured)} of {len(rows)} points have a value, four fifths are needed; check cable and range"
             return self.nothing(part, note), texts
         try:
-            diagnosis = judged(part, kept)
+            diagnosis = judged(part, measured)
         except NotIdentified as problem:
             return self.nothing(part, str(problem)), texts
-        figures = figures_of_transfer(part, diagnosis, transfer_points(kept), device.scale.get(unit))
-        texts += [*diagnosis_text(diagnosis), *condition_texts(kept)]
+        figures = figures_of_transfer(part, diagnosis, transfer_points(measured), device.scale.get(unit))
+        texts += [*diagnosis_text(diagnosis), *condition_texts(measured)]
         band = next(figure for figure in figures if figure.figure == "sweep_bandwidth_hz")
         if band.identified:
-            texts.append(("sampling", sampling_text(float(kept["rate_hz"].max()), band.value, part.bandwidth_order)))
+            texts.append(
+                ("sampling", sampling_text(float(measured["rate_hz"].max()), band.value, part.bandwidth_order))
+            )
         return figures, texts
 
     def compared(
         self, part: SweepPart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
     ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
         """Magnitude and phase at every point, and the judged model through them."""
-        kept = rows[np.isfinite(rows["value"])]
-        if len(kept) < max(FEWEST_POINTS, 0.8 * len(rows)):
+        measured = rows[np.isfinite(rows["value"])]
+        if len(measured) < max(FEWEST_POINTS, 0.8 * len(rows)):
             return [], []
         try:
-            diagnosis = judged(part, kept)
+            diagnosis = judged(part, measured)
         except NotIdentified:
             return [], []
-        return transfer_results(part, diagnosis, kept, out_unit)
+        return transfer_results(part, diagnosis, measured, out_unit)
 
     def verdict(self, part: SweepPart, rows: pd.DataFrame) -> str:
         """The verdict on the model of the transfer function."""
@@ -214,10 +216,12 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
 
     def chart(self, part: SweepPart, points: pd.DataFrame) -> Chart | None:
         """Magnitude with uncertainty, phase, coherence, and the residual of the model."""
-        kept = points[np.isfinite(points["value"])]
-        if len(kept) < FEWEST_POINTS:
+        measured = points[np.isfinite(points["value"])]
+        if len(measured) < FEWEST_POINTS:
             return None
-        return bode_chart(transfer_points(kept), judged(part, kept), kept["coherence"].to_numpy(dtype=float))
+        return bode_chart(
+            transfer_points(measured), judged(part, measured), measured["coherence"].to_numpy(dtype=float)
+        )
 
 
 def judged(part: SweepPart, rows: pd.DataFrame) -> TransferDiagnosis:

@@ -142,15 +142,15 @@ def response_point(
     silent = size <= SILENT * tone.amplitude_error[0]  # an output of constant zero has neither tone nor noise
     clipped = device.at_end(answer.output[:, axis]) > 0
     power = 0.5 * size**2
-    whole = not silent and not clipped and bool(np.isfinite(ratio))
+    valid = not silent and not clipped and bool(np.isfinite(ratio))
     return {
         "axis": part.axis,
         "series": "response",
         "point": number,
         "setting": frequency,
-        "value": float(abs(ratio)) if whole else np.nan,
-        "uncertainty": float(abs(ratio)) * magnitude if whole else np.nan,
-        "phase_deg": float(np.degrees(np.angle(ratio))) if whole else np.nan,
+        "value": float(abs(ratio)) if valid else np.nan,
+        "uncertainty": float(abs(ratio)) * magnitude if valid else np.nan,
+        "phase_deg": float(np.degrees(np.angle(ratio))) if valid else np.nan,
         "phase_uncertainty_deg": float(np.degrees(phase)),
         "level_g": level,
         "record_s": len(answer.output) / answer.rate_hz,

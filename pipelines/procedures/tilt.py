@@ -129,14 +129,14 @@ class Tilt(RecordByRecord):
         traces = [level(np.array([-180.0, 180.0]), 0.0)]
         for axis in _turned(part, points):
             rows = points[points["axis"] == axis]
-            linear, whole = _fit(part, rows, orders=1), _fit(part, rows)
-            residual, error = MICRO * linear.residuals / linear.scale[0], 2.0 * MICRO * whole.spread / linear.scale[0]
+            linear, model = _fit(part, rows, orders=1), _fit(part, rows)
+            residual, error = MICRO * linear.residuals / linear.scale[0], 2.0 * MICRO * model.spread / linear.scale[0]
             name, role = f"axis {axis}, ± 2 σ", cast("Role", axis)
             traces.append(
                 Trace(name, np.degrees(linear.angle), residual, role=role, error=np.broadcast_to(error, residual.shape))
             )
             if part.orders == 3:
-                curve = MICRO * whole.curve(turn) / linear.scale[0]
+                curve = MICRO * model.curve(turn) / linear.scale[0]
                 traces.append(Trace(f"K2 and K3 of axis {axis}", np.degrees(turn), curve, "line", role))
         axes = PlotAxis("angle / °", step=45.0), PlotAxis("residual from bias and scale / µg")
         return Chart(self.title, (Plot("", *axes, tuple(traces)),))

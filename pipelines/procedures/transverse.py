@@ -103,8 +103,8 @@ class TransverseTest(InG, OnEquipment, Compares):
             recorded = [(k, record) for k, record in enumerate(records) if unit in record.samples]
             tones = [_tones(part, record, record.samples[unit], scale_of(part, device, unit)) for _, record in recorded]
             turns = _turns(tones)
-            for (k, record), (drive, answer, noise, whole), turn in zip(recorded, tones, turns, strict=True):
-                rows.append(_point(part, k, record, (drive, answer, noise), turn, whole=whole) | {"unit": unit})
+            for (k, record), (drive, answer, noise, responds), turn in zip(recorded, tones, turns, strict=True):
+                rows.append(_point(part, k, record, (drive, answer, noise), turn, responds=responds) | {"unit": unit})
         return point_table(rows)
 
     def of_unit(self, part: TransversePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
@@ -140,10 +140,10 @@ class TransverseTest(InG, OnEquipment, Compares):
 
     def chart(self, part: TransversePart, points: pd.DataFrame) -> Chart:
         """Output over the angle with its uncertainty, the fitted sine, and the direction of the maximum."""
-        kept = points[np.isfinite(points["value"])]
-        setting, value, error = numbers(kept)
+        measured = points[np.isfinite(points["value"])]
+        setting, value, error = numbers(measured)
         traces = [Trace("measured, U (k = 2)", setting, value, error=2.0 * error)]
-        if len(kept) >= FEWEST_ANGLES:
+        if len(measured) >= FEWEST_ANGLES:
             fit = fitted(points)
             angle = np.linspace(0.0, 360.0, 361)
             wave = 100.0 * (fit.value * np.cos(np.radians(angle - fit.direction_deg)) + fit.offset)
@@ -158,11 +158,11 @@ class TransverseTest(InG, OnEquipment, Compares):
 
 def fitted(rows: pd.DataFrame) -> Transverse:
     """The sine through the points of one unit that have a value."""
-    kept = rows[np.isfinite(rows["value"])]
-    if len(kept) < max(FEWEST_ANGLES, 0.8 * len(rows)):
-        msg = f"{len(kept)} of {len(rows)} angles have a value, four fifths are needed; check cable and range"
+    measured = rows[np.isfinite(rows["value"])]
+    if len(measured) < max(FEWEST_ANGLES, 0.8 * len(rows)):
+        msg = f"{len(measured)} of {len(rows)} angles have a value, four fifths are needed; check cable and range"
         raise NotIdentified(msg)
-    first, second, value, error = numbers(kept, "first", "second", "value", "uncertainty")
+    first, second, value, error = numbers(measured, "first", "second", "value", "uncertainty")
     return fit_transverse(first, second, 1e-2 * value, 1e-2 * error)
 
 
@@ -192,7 +192,7 @@ def _tones(
 
 def _turns(tones: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]) -> np.ndarray:
     """Phase factor (records,) that turns the unit into phase with the reference; 1 where the unit does not respond."""
-    seen = np.array([whole for *_, whole in tones], dtype=bool)
+    seen = np.array([responds for *_, responds in tones], dtype=bool)
     turns = np.ones(len(tones), dtype=np.complex128)
     if np.count_nonzero(seen) >= FEWEST_ANGLES:
         drive, answer = (np.array([tone[k] for tone in tones])[seen] for k in (0, 1))
@@ -207,7 +207,7 @@ def _point(
     tones: tuple[np.ndarray, np.ndarray, np.ndarray],
     turn: complex,
     *,
-    whole: bool,
+    responds: bool,
 ) -> dict[str, Any]:
     """One angle of one unit: the part along the axis that the reference measures is subtracted."""
     drive, answer, noise = tones
@@ -225,8 +225,8 @@ def _point(
         "series": "across",
         "point": number,
         "setting": angle,
-        "value": 100.0 * ratio if whole else np.nan,
-        "uncertainty": 100.0 * error if whole else np.nan,
+        "value": 100.0 * ratio if responds else np.nan,
+        "uncertainty": 100.0 * error if responds else np.nan,
         "first": float(np.real(drive[first] / driven)),
         "second": float(np.real(drive[second] / driven)),
         "along_percent": 100.0 * float(abs(drive[axis] / driven)),

@@ -143,8 +143,8 @@ def quantities_of_added(diagnosis: Diagnosis) -> tuple[list[DriverValues], list[
     if of_angles and any(isinstance(effect, StationEffect) and "force" in names for effect, names in drivers):
         for name, values in (("outer_deg", state.outer), ("inner_deg", state.inner)):
             if values is not None and float(np.ptp(values)) > 0.0:
-                whole = np.broadcast_to(np.degrees(values), (problem.lot.output.shape[0], problem.n))
-                series.append(DriverValues(name, LABELS.get(name, name), whole))
+                degrees = np.broadcast_to(np.degrees(values), (problem.lot.output.shape[0], problem.n))
+                series.append(DriverValues(name, LABELS.get(name, name), degrees))
     if not problem.lot.radial and any(
         not isinstance(effect, StationEffect) and "force" in names for effect, names in drivers
     ):

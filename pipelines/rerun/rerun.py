@@ -124,8 +124,8 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
             named = ", ".join(f"{unit}:{dwell}" for unit, dwell in step.parameters["left_out"])
             rows.append(_change(step.name, "dwells left out", "", named))
             continue
-        kept = step.name in {"capture", "import"} or (step.name in FROM_SAMPLES and not raw)
-        if kept or not there.issuperset(step.outputs):
+        given = step.name in {"capture", "import"} or (step.name in FROM_SAMPLES and not raw)
+        if given or not there.issuperset(step.outputs):
             continue
         manifest = old.manifest(step.outputs[0])
         if manifest.get("code") != step.code:
@@ -136,8 +136,8 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
             for key, value in step.parameters.items()
             if key in before and before[key] != value
         ]
-    whole = {name for step in plan.steps for name in step.outputs}
-    if there >= {"dwells"} and not whole <= there and not old.about.get("capture"):
+    planned = {name for step in plan.steps for name in step.outputs}
+    if there >= {"dwells"} and not planned <= there and not old.about.get("capture"):
         rows.append(_change("fit", "not fitted yet", "", ""))
     return rows
 

@@ -139,9 +139,9 @@ def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
 def _captured(run: Run, change: ModelChange) -> Plan:
     job = archived_job(run, change)
     steps = [_capture_step(run, job)]
-    whole = run.records is not None and run.records.is_complete()
+    complete = run.records is not None and run.records.is_complete()
     for stage in STAGES:
-        if stage.name == "soak_noise" and not whole and stage.outputs[0] not in run.tables():
+        if stage.name == "soak_noise" and not complete and stage.outputs[0] not in run.tables():
             continue  # a run of an earlier version whose samples are gone
         parameters, code, call = stage.parameters(job), code_hash(stage.name), partial(stage.call, job)
         steps.append(StageCall(stage.name, stage.inputs, stage.outputs, parameters, code, call))
@@ -211,8 +211,8 @@ def _import_plan(
     about = run.about
     named = [f"{unit}:{dwell}" for unit, dwell in left_out]
     noted = {"left_out": [*about.get("left_out", []), *named]} if left_out else {}
-    kept = {"recipe": {**about.get("recipe", {}), "name": "import", **recipe}, **more}
-    return Plan("import", tuple(steps), {**without_provenance(about), **kept, **noted}, {**depends, **noted})
+    about_import = {"recipe": {**about.get("recipe", {}), "name": "import", **recipe}, **more}
+    return Plan("import", tuple(steps), {**without_provenance(about), **about_import, **noted}, {**depends, **noted})
 
 
 def _fit_for_a_fit(run: Run) -> pd.DataFrame:

@@ -81,21 +81,21 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange
 def summary(lots: Sequence[LotComparison], later: Sequence[Fresh]) -> dict[str, Any]:
     """The what-if as a document: total, by station and device, changed outcomes, failed lots, and a verdict."""
     by_run = {fresh.run: fresh for fresh in later}
-    whole = [judged for judged in lots if judged.sides]
+    compared = [judged for judged in lots if judged.sides]
     groups: dict[tuple[str, str], list[LotComparison]] = defaultdict(list)
-    for judged in whole:
+    for judged in compared:
         groups[judged.entry.station, judged.entry.device].append(judged)
     rows = [
         {"station": station, "device": device, **_figures(members, by_run)}
         for (station, device), members in sorted(groups.items())
     ]
-    total = _figures(whole, by_run)
-    verdict, explanation = _verdict(total, rows, whole, by_run)
+    total = _figures(compared, by_run)
+    verdict, explanation = _verdict(total, rows, compared, by_run)
     return {
-        "lots": len(whole),
+        "lots": len(compared),
         "total": total,
         "groups": rows,
-        "flips": _flips(whole),
+        "flips": _flips(compared),
         "failed": [{"run": judged.entry.id, "error": judged.error} for judged in lots if judged.error],
         "verdict": verdict,
         "words": explanation,

@@ -146,7 +146,7 @@ def _prior_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
 _PRIOR: dict[str, Any] = {
     "texts": "unit axis effect name",
     "numbers": "mean standard_deviation share widened p_value",
-    "whole": "units",
+    "integers": "units",
     "flags": "fits own",
 }
 
@@ -255,15 +255,15 @@ def _bias_of(lot: LotArrays, fitted: NoisyFit, scale: Array) -> dict[str, Array]
 def _nothing() -> dict[str, pd.DataFrame]:
     return {
         "coefficients": empty_table(texts="unit axis effect name unit_text", numbers="value standard_error"),
-        "covariance": empty_table(texts="unit axis", numbers="value", whole="row column"),
+        "covariance": empty_table(texts="unit axis", numbers="value", integers="row column"),
         "residuals": empty_table(
-            texts="unit axis pose", numbers="force_g residual_ug standard_error_ug expected_ug unit_C", whole="dwell"
+            texts="unit axis pose", numbers="force_g residual_ug standard_error_ug expected_ug unit_C", integers="dwell"
         ),
-        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
+        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", integers="dwell other"),
         "wander": empty_table(
             texts="unit axis method",
             numbers=" ".join(("white_ug flicker_ug walk_ug lack_of_fit", *COLUMNS)),
-            whole="dof",
+            integers="dof",
         ),
         "prior": empty_table(**_PRIOR),
     }

@@ -74,7 +74,7 @@ def verdict_table(verdict: AdequacyDocument | None, effects: Sequence[str]) -> p
     """A verdict on a model as the table ``verdict``; without rows where there is none."""
     if verdict is None:
         return empty_table(
-            texts="model verdict reason faulty", numbers=" ".join(_FIGURES), whole="units", flags="named"
+            texts="model verdict reason faulty", numbers=" ".join(_FIGURES), integers="units", flags="named"
         )
     row = {
         "model": ",".join(effects),

@@ -70,13 +70,13 @@ def _analysed(
         why = "its records give no value"
     except InertialError as problem:
         table, outcome, why = point_table([]), Outcome({}), str(problem)
-    whole: dict[str, list[FigureValue]] = {}
+    completed: dict[str, list[FigureValue]] = {}
     for unit in units:
         values = list(outcome.figures.get(unit, []))
         there = {value.figure for value in values}
         missing = [spec for spec in procedure.figures if spec.name not in there]
-        whole[unit] = values + [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
-    return table, replace(outcome, figures=whole)
+        completed[unit] = values + [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
+    return table, replace(outcome, figures=completed)
 
 
 def _answered(readings: pd.DataFrame, record: int, accepted: list[str]) -> pd.DataFrame:

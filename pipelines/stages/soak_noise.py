@@ -80,9 +80,9 @@ def _soaks(
     samples: Iterable[pd.DataFrame], readings: pd.DataFrame, calibration: Calibration
 ) -> dict[tuple[str, int], _Soak]:
     """The sums of every unit and soak; a soak whose temperature moved is left out, and records of another length."""
-    kept = readings[~readings["kind"].isin([STATIC, PROCEDURE]) & (readings["status"] == "ok")]
-    found = {(int(r["record"]), str(r["unit"])): r for r in rows_of(kept)}
-    lengths = kept["n"].mode()
+    static = readings[~readings["kind"].isin([STATIC, PROCEDURE]) & (readings["status"] == "ok")]
+    found = {(int(r["record"]), str(r["unit"])): r for r in rows_of(static)}
+    lengths = static["n"].mode()
     soaks: dict[tuple[str, int], _Soak] = {}
     for record, tables in by_record(samples):
         for unit, rows in pd.concat(tables).groupby("unit", sort=False):
@@ -198,7 +198,7 @@ def _nothing() -> dict[str, pd.DataFrame]:
         "soak_noise": empty_table(
             texts="unit axis unit_text note",
             numbers="temperature_C value low high curve curve_u",
-            whole="soak dwells",
+            integers="soak dwells",
             flags="identified",
         ),
         "noise_temperature": empty_table(texts="unit axis verdict", numbers="cold_C hot_C ratio low high p_value"),

@@ -81,9 +81,9 @@ class StaticSeries:
         for unit, rows in samples.groupby("unit", sort=False).indices.items():
             if unit in self._rest:
                 joined = np.concatenate((self._rest[str(unit)], output[rows]))
-                whole = len(joined) // self.size * self.size
-                self._means[str(unit)].append(joined[:whole].reshape(-1, self.size, len(self._letters)).mean(axis=1))
-                self._rest[str(unit)] = joined[whole:]
+                end = len(joined) // self.size * self.size
+                self._means[str(unit)].append(joined[:end].reshape(-1, self.size, len(self._letters)).mean(axis=1))
+                self._rest[str(unit)] = joined[end:]
                 for axis, digits in enumerate(self.digits[str(unit)]):
                     digits.add(output[rows, axis])
 

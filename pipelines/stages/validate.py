@@ -221,14 +221,14 @@ def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:
 
 
 def _of_soak(means: pd.DataFrame, static: pd.DataFrame) -> float:
-    kept = [
+    outputs = [
         rows.set_index("record")[list(AXES)].reindex(static.index).to_numpy(dtype=float)
         for _, rows in means.groupby("unit")
     ]
-    whole = [table for table in kept if np.all(np.isfinite(table))]
-    if not whole:
+    complete = [table for table in outputs if np.all(np.isfinite(table))]
+    if not complete:
         return 0.0
-    return pointing_error(_force(static[["outer_deg", "inner_deg"]].to_numpy(dtype=float)), np.stack(whole, axis=1))
+    return pointing_error(_force(static[["outer_deg", "inner_deg"]].to_numpy(dtype=float)), np.stack(complete, axis=1))
 
 
 SAME_K = 1e-9  # means of equal readings differ by rounding

@@ -153,6 +153,6 @@ def nothing_verified() -> dict[str, pd.DataFrame]:
     numbers = "norm_g error_ug uncertainty_ug reading_ug error_x_ug error_y_ug error_z_ug unit_C"
     numbers += "".join(f" {name.format(letter)}" for name in OF_UNITS for letter in AXES)
     return {
-        "verification": empty_table(texts="unit pose", whole="dwell", numbers=numbers),
-        "verification_poses": empty_table(texts="unit pose", whole="dwells", numbers="error_ug uncertainty_ug"),
+        "verification": empty_table(texts="unit pose", integers="dwell", numbers=numbers),
+        "verification_poses": empty_table(texts="unit pose", integers="dwells", numbers="error_ug uncertainty_ug"),
     }

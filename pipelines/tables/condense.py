@@ -42,8 +42,8 @@ def condense(dwells: pd.DataFrame) -> pd.DataFrame:
         joined[f"sd_{axis}"] = scatter.where(scatter > 0.0, grouped[f"out_{axis}"].std()[f"out_{axis}"])
     if "n" not in joined.columns:
         joined["n"] = grouped.size()["size"]
-    whole = grouped.size()["size"] >= 0.5 * size  # the remainder of a stretch is too short for a dwell of its own
-    return joined[whole].dropna(subset=["sd_x", "sd_y", "sd_z"])
+    full = grouped.size()["size"] >= 0.5 * size  # the remainder of a stretch is too short for a dwell of its own
+    return joined[full].dropna(subset=["sd_x", "sd_y", "sd_z"])
 
 
 def _groups(dwells: pd.DataFrame, numbers: NDArray[np.int64], size: int) -> NDArray[np.int64] | None:

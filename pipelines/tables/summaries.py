@@ -53,7 +53,7 @@ def summarised(
         for record, tables in by_record(samples)
         for row in _of_record(record, tables, full, zero_output, AXES[:axes])
     ]
-    return pd.DataFrame(rows) if rows else empty_table(texts="unit kind", numbers=NUMBERS, whole=WHOLE)
+    return pd.DataFrame(rows) if rows else empty_table(texts="unit kind", numbers=NUMBERS, integers=WHOLE)
 
 
 def unit_means(table: pd.DataFrame) -> dict[str, Array]:
@@ -160,9 +160,9 @@ def first_outlier(output: Array, lsb: float, full_scale: float) -> Outlier | Non
 
 def means(summaries: pd.DataFrame, kinds_but: Sequence[str] = ()) -> pd.DataFrame:
     """Unit, record and mean samples x, y, z of the axes with an output, without some kinds."""
-    kept = summaries[~summaries["kind"].isin(list(kinds_but))]
-    names = dict(zip(there(kept, MEANS), AXES, strict=False))
-    return kept[["unit", "record", *names]].rename(columns=names)
+    rows = summaries[~summaries["kind"].isin(list(kinds_but))]
+    names = dict(zip(there(rows, MEANS), AXES, strict=False))
+    return rows[["unit", "record", *names]].rename(columns=names)
 
 
 def there(table: pd.DataFrame, names: Sequence[str]) -> list[str]:

@@ -223,12 +223,12 @@ def samples_of(bench: Workbench, run: str, dwell: str) -> tuple[pd.DataFrame, st
         tables = [samples[samples["record"] == record]]
     else:
         raise WrongUse(f"run {stored.id} was imported as dwells: its samples were not recorded")
-    kept = [of_unit for part in tables if len(of_unit := part[part["unit"] == unit])]
-    if not kept:
+    samples_of_unit = [of_unit for part in tables if len(of_unit := part[part["unit"] == unit])]
+    if not samples_of_unit:
         raise WrongUse(f"run {stored.id}: no samples of dwell {number} of unit {unit} are stored")
     pose = str(row.get("pose", ""))
     title = f"Unit {unit}, dwell {number}{', pose ' + pose if pose else ''}"
-    return pd.concat(kept, ignore_index=True), str(row.get("out_unit", "")), title
+    return pd.concat(samples_of_unit, ignore_index=True), str(row.get("out_unit", "")), title
 
 
 @cache

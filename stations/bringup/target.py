@@ -122,8 +122,8 @@ def limits_of_orders(profile: Profile, speed: float = SPEED_DEG_S) -> Limits:
     slowest, fastest = bounds_of(profile, "speed", (0.0, speed))
     slow = max(min(speed, fastest), slowest, smallest_speed(profile))
     least, most = bounds_of(profile, "acceleration", (0.0, ACCELERATION_DEG_S2))
-    kept = max(min(ACCELERATION_DEG_S2, most), least)
-    return Limits(outer_deg=(low, high), speed_deg_s=slow, acceleration_deg_s2=kept)
+    acceleration = max(min(ACCELERATION_DEG_S2, most), least)
+    return Limits(outer_deg=(low, high), speed_deg_s=slow, acceleration_deg_s2=acceleration)
 
 
 def smallest_speed(profile: Profile) -> float:

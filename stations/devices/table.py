@@ -94,11 +94,11 @@ class TableAxis(ABC):
 
     def turn(self, target: float, rate_deg_s: float) -> float:
         """Starts a move to ``target`` degrees at a rate of its own, °/s, and returns its expected duration, s."""
-        kept, self._limits = self._limits, self._limits.model_copy(update={"speed_deg_s": rate_deg_s})
+        before, self._limits = self._limits, self._limits.model_copy(update={"speed_deg_s": rate_deg_s})
         try:
             return self.start(target)
         finally:
-            self._limits = kept
+            self._limits = before
 
     def _order_once(self, target: float) -> None:
         try:

@@ -126,11 +126,11 @@ def read_frames(path: Path) -> FrameFile:
     """
     with readable(path):
         lines = path.read_bytes().split(b"\n")
-    whole, torn = lines[:-1], lines[-1]
+    complete, torn = lines[:-1], lines[-1]
     content = FrameFile(
         path.name, remark=f"the last line is incomplete ({len(torn)} bytes) and left out" if torn else ""
     )
-    for number, entry in _entries(path, whole):
+    for number, entry in _entries(path, complete):
         if number == 1:
             if entry.get("format") != FORMAT:
                 raise DataRejected(
@@ -142,7 +142,7 @@ def read_frames(path: Path) -> FrameFile:
             f"recording: {path.name}, line {number}", "a line of the recorder is needed; give another recording"
         ):
             _add(content, entry)
-    if not whole:
+    if not complete:
         raise DataRejected(f"recording: {path} has no line, a recording is needed; give another file")
     return content
 

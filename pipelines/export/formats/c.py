@@ -63,8 +63,8 @@ def _filled(text: str, names: dict[str, str]) -> str:
 
 def _real_unit(unit: UnitCalibration, kind: str) -> str:
     exact = np.float32 if kind == "float" else np.float64
-    whole = unit.with_every_axis
-    bias, response = whole.bias.astype(exact), whole.response.astype(exact)
+    full = unit.with_every_axis
+    bias, response = full.bias.astype(exact), full.response.astype(exact)
     limits = np.array(unit.temperatures, dtype=exact)
     literal = _literal(exact)
     crc = checksum(unit.unit, _PACKED[kind], [*limits, *bias.ravel(), *response.ravel()])
@@ -96,11 +96,11 @@ def _literal(exact: type[np.float32 | np.float64]) -> Callable[[Any], str]:
 
 
 def _fixed_unit(unit: UnitCalibration) -> str:
-    fixed, whole = fixed_point(unit), unit.with_every_axis
-    errors = f"at 1 g: {largest_error_ug(whole, fixed.correct):.3g} ug"
+    fixed, full_unit = fixed_point(unit), unit.with_every_axis
+    errors = f"at 1 g: {largest_error_ug(full_unit, fixed.correct):.3g} ug"
     if unit.full_scale is not None:
         full = unit.full_scale / fixed.scale
-        errors += f", at full scale ({full:.3g} g): {largest_error_ug(whole, fixed.correct, full):.3g} ug"
+        errors += f", at full scale ({full:.3g} g): {largest_error_ug(full_unit, fixed.correct, full):.3g} ug"
     factor = round(2.0**_COUNTS_BITS / fixed.scale) if unit.out_unit == "LSB" else 0
     low, high = fixed.range_mC
     crc = checksum(unit.unit, "i", [low, high, *fixed.bias.ravel(), *fixed.inverse.ravel()])

@@ -142,7 +142,7 @@ def axis_lines(stated: dict[str, Accelerometer]) -> list[str]:
 
 def _left_out(unit: UnitCalibration, stated: dict[str, Accelerometer]) -> list[str]:
     """What a reader's V / sensitivity leaves of the calibration, µg; the axes without an output are known."""
-    whole = unit.with_every_axis
+    full = unit.with_every_axis
     scale = np.ones(3)
     for sensor in stated.values():
         scale[sensor.axis] = STANDARD_GRAVITY_M_S2 * np.copysign(
@@ -152,4 +152,4 @@ def _left_out(unit: UnitCalibration, stated: dict[str, Accelerometer]) -> list[s
     def applied(output: Array, temperature: float) -> Array:
         return output / scale
 
-    return comment_lines(whole, applied, (BIAS, BIAS_T, SCALE_T, ACROSS, ACROSS_T))
+    return comment_lines(full, applied, (BIAS, BIAS_T, SCALE_T, ACROSS, ACROSS_T))

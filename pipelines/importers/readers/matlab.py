@@ -68,11 +68,11 @@ def _plain(name: str, data: bytes) -> bytes:
             raise DataRejected(
                 f"{name}: a MATLAB file that ends inside a variable ({len(body)} of {count} bytes are there); {REMEDY}"
             )
-        whole = inflated(body, size, len(data), name) if kind == COMPRESSED else data[at : at + _TAG + count]
-        size += len(whole)
+        variable = inflated(body, size, len(data), name) if kind == COMPRESSED else data[at : at + _TAG + count]
+        size += len(variable)
         refuse_larger(size, len(data), name)
-        if _Form(whole, order, name).check():
-            parts.append(whole)
+        if _Form(variable, order, name).check():
+            parts.append(variable)
         at += _TAG + count
     return b"".join(parts)
 

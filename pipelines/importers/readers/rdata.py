@@ -68,9 +68,9 @@ def _times(values: Any, attributes: Any) -> Any:
 
 def _long_integers(values: Any, attributes: Any) -> Any:
     """The integers of the package bit64: 64 bits, saved as if they were floating-point numbers; NA is the lowest of them."""
-    whole = np.asarray(values, dtype=float).view(np.int64)
-    gone = whole == np.iinfo(np.int64).min
-    return np.where(gone, np.nan, whole.astype(float)) if gone.any() else whole
+    integers = np.asarray(values, dtype=float).view(np.int64)
+    gone = integers == np.iinfo(np.int64).min
+    return np.where(gone, np.nan, integers.astype(float)) if gone.any() else integers
 
 
 def _plain_column(values: pd.Series) -> pd.Series:

@@ -74,11 +74,11 @@ class _LibraryLog(logging.Handler):
 
 def _content(channels: list[Any], name: str) -> Content:
     longest = max(len(channel) for channel in channels)
-    kept = [channel for channel in channels if len(channel) == longest]
+    equal_length = [channel for channel in channels if len(channel) == longest]
     left_out = [channel.name for channel in channels if len(channel) != longest]
-    columns = {channel.name: np.asarray(channel[:]) for channel in kept}
-    units = {channel.name: str(channel.properties.get("unit_string") or "") for channel in kept}
-    intervals = {float(c.properties["wf_increment"]) for c in kept if "wf_increment" in c.properties}
+    columns = {channel.name: np.asarray(channel[:]) for channel in equal_length}
+    units = {channel.name: str(channel.properties.get("unit_string") or "") for channel in equal_length}
+    intervals = {float(c.properties["wf_increment"]) for c in equal_length if "wf_increment" in c.properties}
     interval = intervals.pop() if len(intervals) == 1 else None
     if len(intervals) >= 1:
         raise DataRejected(
@@ -86,7 +86,7 @@ def _content(channels: list[Any], name: str) -> Content:
             "one is needed; export them apart"
         )
     if interval is not None and interval > 0.0 and "time" not in columns:
-        start = float(kept[0].properties.get("wf_start_offset") or 0.0)
+        start = float(equal_length[0].properties.get("wf_start_offset") or 0.0)
         columns = {"time": start + interval * np.arange(longest), **columns}
         units["time"] = "s"
     remarks = (f"channels of another length were left out: {', '.join(left_out[:6])}",) if left_out else ()

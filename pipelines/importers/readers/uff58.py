@@ -54,7 +54,7 @@ def read(name: str, data: bytes, group: str) -> Content:
     names = [(_clock_name(clock), count) for clock, count in clocks.items()]
     group_name = chosen(names, group, name)
     clock = next(clock for clock in clocks if _clock_name(clock) == group_name)
-    kept = [record for record in records if record[1] == clock]
+    of_clock = [record for record in records if record[1] == clock]
     if clock[3] != TIME:
         raise DataRejected(
             f"{name}: the abscissa of these records is of type {clock[3]}, time (type {TIME}) is needed; export time records"
@@ -62,7 +62,7 @@ def read(name: str, data: bytes, group: str) -> Content:
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     remarks: list[str] = []
-    for label, _, values, unit, kind in kept:
+    for label, _, values, unit, kind in of_clock:
         column = label if label not in columns else f"{label} ({len(columns) + 1})"
         columns[column], units[column] = values, unit
         if kind != ACCELERATION:

@@ -48,8 +48,8 @@ def _procedure(unit: UnitContext, number: int, content: dict[str, Any]) -> dict[
     procedure = PROCEDURES.get(str(content.get("kind")))
     if not isinstance(procedure, Evaluated) or figures.empty:
         return None
-    whole = unit.report.tables["procedure_findings"]
-    findings = whole[(whole["number"] == number) & whole["unit"].isin([unit.unit, ""])]
+    every_finding = unit.report.tables["procedure_findings"]
+    findings = every_finding[(every_finding["number"] == number) & every_finding["unit"].isin([unit.unit, ""])]
     return {
         "title": procedure.title,
         "lines": [_line(unit, row, {f.name: f.meaning for f in procedure.figures}) for row in rows_of(figures)],

@@ -70,8 +70,8 @@ def figure_label(name: str) -> str:
     if name in FIGURES:
         return FIGURES[name].label
     unit = UNITS.get(name, "").replace("%", "percent").translate(SPELT)
-    kept = name[: -len(unit) - 1] if name.lower().endswith(f"_{unit}".lower()) else name
-    return kept.replace("_", " ")
+    words = name[: -len(unit) - 1] if name.lower().endswith(f"_{unit}".lower()) else name
+    return words.replace("_", " ")
 
 
 def plain_reason(text: str) -> str:

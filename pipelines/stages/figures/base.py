@@ -81,8 +81,8 @@ class LotCoefficients:
             return np.zeros_like(self.effect(effect, unit)[1])
         if effect not in self._noise:
             self._noise[effect] = self._calibration.standard_error(effect)
-        whole, noise = self.effect(effect, unit)[1], self._noise[effect][unit]
-        return np.sqrt(np.maximum(whole**2 - noise**2, 0.0))
+        total, noise = self.effect(effect, unit)[1], self._noise[effect][unit]
+        return np.sqrt(np.maximum(total**2 - noise**2, 0.0))
 
     def _with_budget(self) -> Calibration:
         """The calibration with the budget's covariance of each axis added to that of the noise."""

@@ -85,13 +85,13 @@ def propagate(
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     physical = with_device_temperature(model, calibration.response, terms.stability, calibration.axes)
     inputs, scattered = influences(terms.stated, at, terms.stability)
-    whole = sensitivity(physical, lot.state, inputs, scattered)
+    source = sensitivity(physical, lot.state, inputs, scattered)
     design = fit_design(model, lot.state, dwell_noise(lot, wander, used), used)
-    fitted = replace(whole, changes=whole.changes[..., used, :, :])
+    fitted = replace(source, changes=source.changes[..., used, :, :])
     fit = propagated(design, fitted, calibration.response)
     return VarianceParts(
         fit=fit,
-        verification=whole.changes[..., ~used, :, :],
+        verification=source.changes[..., ~used, :, :],
         visible_share=lambda: design.visible_share(fitted.changes, fit.coefficients),
     )
 

@@ -53,8 +53,10 @@ def compared_tables(results: pd.DataFrame, terms: BudgetTerms) -> dict[str, pd.D
         }
         contributions = list(_contributions(row, terms))
         sums.append(about | _sum(row, contributions) | {"frame": terms.certificate.frame, "setting": row["setting"]})
-        whole = sum(part["u"] ** 2 for part in contributions)
-        parts += [about | part | {"share": part["u"] ** 2 / whole if whole > 0.0 else 0.0} for part in contributions]
+        variance = sum(part["u"] ** 2 for part in contributions)
+        parts += [
+            about | part | {"share": part["u"] ** 2 / variance if variance > 0.0 else 0.0} for part in contributions
+        ]
     return {"budget": pd.DataFrame(parts), "uncertainties": pd.DataFrame(sums)}
 
 
@@ -99,11 +101,11 @@ def _sum(row: Mapping[str, Any], contributions: Iterable[Mapping[str, Any]]) -> 
     u = np.array([part["u"] for part in parts])
     random = np.array([part["type"] == "A" for part in parts])
     dof = effective_degrees(u[None, :], np.array([part["dof"] for part in parts])[None, :])
-    k, whole = float(coverage_factors(dof)[0]), float(np.sqrt(np.sum(u**2)))
+    k, combined = float(coverage_factors(dof)[0]), float(np.sqrt(np.sum(u**2)))
     order = [int(n) for n in np.argsort(-u, kind="stable")[:LARGEST] if u[n] > 0.0]
-    largest = ", ".join(f"{LABELS[parts[n]['contribution']]} {100.0 * (u[n] / whole) ** 2:.0f} %" for n in order)
+    largest = ", ".join(f"{LABELS[parts[n]['contribution']]} {100.0 * (u[n] / combined) ** 2:.0f} %" for n in order)
     return {
         "value": float(row["value"]), "u_a": float(np.sqrt(np.sum(u[random] ** 2))),
-        "u_b": float(np.sqrt(np.sum(u[~random] ** 2))), "u": whole, "dof": float(dof[0]), "k": k, "expanded": k * whole,
+        "u_b": float(np.sqrt(np.sum(u[~random] ** 2))), "u": combined, "dof": float(dof[0]), "k": k, "expanded": k * combined,
         "shown": float("nan"), "unseen": float("nan"), "largest": largest,
     }  # fmt: skip

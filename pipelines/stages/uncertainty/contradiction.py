@@ -59,9 +59,9 @@ def lot_references(tables: BudgetTables, terms: BudgetTerms) -> LotReferences | 
         return "one unit alone: errors of the table cannot be separated from its noise; measure two or more together"
     evidence, groups, along = _evidence(lot, tables, terms, terms.stated)
     first = int(along[0])  # they are the last ones, and taken to be zero
-    kept = CommonEvidence(evidence.information[:first, :first], evidence.projection[:first])
-    looked = sizes(kept, groups)
-    found = contradictions(kept, groups, looked)
+    of_table = CommonEvidence(evidence.information[:first, :first], evidence.projection[:first])
+    looked = sizes(of_table, groups)
+    found = contradictions(of_table, groups, looked)
     return LotReferences(tuple(found), tuple(looked), probability(looked), beyond(evidence, along, groups, found))
 
 
@@ -76,14 +76,14 @@ def _evidence(
         stated = stated.model_copy(update={"pose": stated.pose.model_copy(update={"seen_in_residuals": False})})
     inputs, scattered = influences(stated, conditions(lot, tables.dwells, calibration.response, terms), terms.stability)
     common = [error for error in inputs if error.scope in COMMON]
-    whole = sensitivity(physical, state, common, scattered)
+    source = sensitivity(physical, state, common, scattered)
     shape = (*lot.output.shape, -1)
     along = _each_dwell(ALONG_G * difference(physical, state, Errors(gravity=1.0)), lot.output.shape)
     sensor, station = design.split(model.effects)
     columns = design.local_columns(sensor, state, model.nonlinear)
     columns = np.broadcast_to(columns, (len(lot.units), *columns.shape[-3:]))
     left = lot.output - predict(model.effects, state, model.coefficients, model.nonlinear)
-    parts = [np.broadcast_to(whole.changes, (*lot.output.shape, whole.changes.shape[-1])), along]
+    parts = [np.broadcast_to(source.changes, (*lot.output.shape, source.changes.shape[-1])), along]
     if station:
         shared = design.shared_columns(station, state, model.nonlinear, calibration.response)
         parts.insert(
@@ -91,7 +91,7 @@ def _evidence(
         )
     free = parts[0].shape[-1] if station else 0
     evidence = common_evidence(columns, np.concatenate(parts, axis=-1), left, _noise(lot, left, model.effects))
-    names = np.array(whole.contributions, dtype=object)
+    names = np.array(source.contributions, dtype=object)
     groups = {name: np.flatnonzero(names == name) for name in JUDGED if np.any(names == name)}
     return without(evidence, np.arange(free)), groups, names.size + np.arange(along.shape[-1])
 

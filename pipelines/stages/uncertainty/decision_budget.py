@@ -48,8 +48,8 @@ class _PartBudget:
         self.units = self._lot.calibration.units
         self._groups = groups_of(self._lot.variances)
         self._known: dict[str, dict[Key, list[BudgetRow]]] = {}
-        whole = symmetric(self._lot.variances.fit.covariance())
-        self.covariance: Array = np.broadcast_to(whole, (len(self.units), *whole.shape[-2:]))
+        covariance = symmetric(self._lot.variances.fit.covariance())
+        self.covariance: Array = np.broadcast_to(covariance, (len(self.units), *covariance.shape[-2:]))
 
     def rows(self, name: str) -> Mapping[Key, list[BudgetRow]]:
         """The quantities of the part of the budget with a name, for every unit in order; none for an unknown name."""

@@ -53,7 +53,7 @@ def lot_risks(figures: pd.DataFrame, limits: Limits, shared: Mapping[str, float]
                 "largest_pfa": float(np.fmax.reduce(columns["pfa"])),
             }
         )
-    return pd.DataFrame(rows) if rows else empty_table(texts=TEXTS, whole="units", numbers=NUMBERS)
+    return pd.DataFrame(rows) if rows else empty_table(texts=TEXTS, integers="units", numbers=NUMBERS)
 
 
 def _risks(

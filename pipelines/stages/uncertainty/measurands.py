@@ -199,8 +199,8 @@ def output_noise(calibration: Calibration, columns: Array) -> Array:
 def _worst(name: str, axis: str, errors: Array, variance: Array, value: Array, dof: Array) -> BudgetQuantity:
     """The quantity at the condition where its variance is largest, by unit; errors (units, m, q), g, variance (units, m), µg²."""
     errors = np.broadcast_to(errors, (value.size, *errors.shape[-2:]))
-    whole = MICRO**2 * np.einsum("umq,umq->um", errors, errors) + variance
-    where = np.argmax(whole, axis=-1)
+    total = MICRO**2 * np.einsum("umq,umq->um", errors, errors) + variance
+    where = np.argmax(total, axis=-1)
     rows = np.arange(value.size)
     return BudgetQuantity(name, axis, "µg", value, np.sqrt(variance[rows, where]), MICRO * errors[rows, where], dof)
 
@@ -238,23 +238,23 @@ def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
     )
 
 
-def _verification(whole: LotBudget, *, split: bool) -> Iterator[BudgetQuantity]:
+def _verification(budget: LotBudget, *, split: bool) -> Iterator[BudgetQuantity]:
     """RMS error of each axis for the user, and the magnitude at its worst pose.
 
     Parameters
     ----------
     split : whether the part that the station's own verification shows, and that which it cannot, are computed
     """
-    lot, calibration, variances = whole.lot, whole.calibration, whole.variances
+    lot, calibration, variances = budget.lot, budget.calibration, budget.variances
     unseen = lot.of_kind("verification")
     columns = design.local_columns(design.split(calibration.effects)[0], lot.state, calibration.nonlinear)
     columns = columns[..., unseen, :]
     force = np.broadcast_to(lot.state.force, (*lot.output.shape[:1], *lot.state.force.shape[-2:]))[:, unseen]
-    intrinsic = whole.terms.certificate.frame == "intrinsic"
+    intrinsic = budget.terms.certificate.frame == "intrinsic"
     true = MICRO * variances.fit.user_errors(columns, force, intrinsic=intrinsic)
     shown = MICRO * variances.fit.shown_errors(columns, variances.verification) if split else None
     hidden = variances.visible < UNSEEN if split else None
-    rows = whole.tables.verification
+    rows = budget.tables.verification
     for axis, letter in enumerate(calibration.letters):
         pose_errors = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
         noise, expected, freedom = (
@@ -263,7 +263,7 @@ def _verification(whole: LotBudget, *, split: bool) -> Iterator[BudgetQuantity]:
         parts = np.sqrt(np.mean(true[..., axis, :] ** 2, axis=-2))
         parts = np.broadcast_to(parts, (len(lot.units), parts.shape[-1]))
         value = np.sqrt(np.mean(pose_errors**2, axis=1))
-        quantity = BudgetQuantity("bias_error", letter, "µg", value, noise, parts, whole.dof)
+        quantity = BudgetQuantity("bias_error", letter, "µg", value, noise, parts, budget.dof)
         if shown is not None and hidden is not None:
             seen, unshown = (
                 _all(rms_over(part), lot) for part in (shown[..., axis, :], true[..., axis, :][..., hidden])
@@ -276,9 +276,9 @@ def _verification(whole: LotBudget, *, split: bool) -> Iterator[BudgetQuantity]:
         yield quantity
     seen_force = design.of_axes(force, calibration.axes, -1)
     along = norm_errors(true / MICRO, seen_force)
-    value, noise = _worst_pose(lot, whole.tables)
+    value, noise = _worst_pose(lot, budget.tables)
     variance = np.zeros(along.shape[:-1]) + noise[:, None] ** 2
-    worst = _worst("verification_norm", "norm", along, variance, value, whole.dof)
+    worst = _worst("verification_norm", "norm", along, variance, value, budget.dof)
     if shown is None or hidden is None:
         yield worst
         return
@@ -315,11 +315,11 @@ def _period(errors: list[BudgetQuantity], budget: LotBudget) -> Iterator[BudgetQ
     axes: list[AxisErrors] = []
     for letter in lot.letters:
         of_run = next(q for q in errors if q.name == "bias_error" and q.axis == letter).axis_errors
-        whole = [growth for unit in lot.units if (growth := period_of(tables, terms, unit, letter, span)) is not None]
-        if len(whole) != len(lot.units) or of_run is None:
+        growths = [growth for unit in lot.units if (growth := period_of(tables, terms, unit, letter, span)) is not None]
+        if len(growths) != len(lot.units) or of_run is None:
             return
-        names = dict.fromkeys(name for growth in whole for name in growth)
-        later = {name: np.array([growth.get(name, 0.0) for growth in whole]) for name in names}
+        names = dict.fromkeys(name for growth in growths for name in growth)
+        later = {name: np.array([growth.get(name, 0.0) for growth in growths]) for name in names}
         axes.append(replace(of_run, later=later))
     zero, none = np.zeros(len(lot.units)), np.zeros((len(lot.units), 0))
     by_axis = [{"run": axis.run, "budget": axis.fixed, **axis.later} for axis in axes]

@@ -73,8 +73,8 @@ class Reach:
     @property
     def shares(self) -> dict[str, float]:
         """Share of each contribution in the sum of their squares, the largest first."""
-        whole = sum(part**2 for part in self.parts.values())
-        shares = {name: part**2 / whole for name, part in self.parts.items()} if whole > 0.0 else {}
+        variance = sum(part**2 for part in self.parts.values())
+        shares = {name: part**2 / variance for name, part in self.parts.items()} if variance > 0.0 else {}
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
@@ -154,8 +154,8 @@ def _errors(
         u = _combined(parts)
         out.append(Reach("bias_error", letter, "µg", u, parts))
         if later is not None:
-            whole = {"run": planned.run_ug, "budget": u, **later}
-            out.append(Reach("bias_error_period", letter, "µg", _combined(whole), whole))
+            over_period = {"run": planned.run_ug, "budget": u, **later}
+            out.append(Reach("bias_error_period", letter, "µg", _combined(over_period), over_period))
             flat = changes.reshape(-1, changes.shape[-1])
             run, fixed, dof = (np.array([value]) for value in (planned.run_ug, u, float(len(state.force))))
             after = {name: np.array([value]) for name, value in later.items()}

@@ -72,7 +72,7 @@ def empty() -> dict[str, pd.DataFrame]:
     return {
         "budget": empty_table(texts=TEXTS, numbers=NUMBERS),
         "uncertainties": empty_table(texts=SUM_TEXTS, numbers=SUM_NUMBERS),
-        "budget_covariance": empty_table(texts="unit", whole="row column", numbers="value"),
+        "budget_covariance": empty_table(texts="unit", integers="row column", numbers="value"),
     }
 
 

@@ -46,12 +46,12 @@ def _of_unit(dwells: NormDwells, tables: BudgetTables, terms: BudgetTerms, state
     )
     physical = with_device_temperature(dwells.model, dwells.calibration.response, terms.stability)
     inputs, scattered = influences(stated, at, terms.stability)
-    whole = sensitivity(physical, lot.state, inputs, scattered)
-    fitted = propagated_by_norm(dwells.design, whole, dwells.calibration.response)
+    source = sensitivity(physical, lot.state, inputs, scattered)
+    fitted = propagated_by_norm(dwells.design, source, dwells.calibration.response)
     variances = VarianceParts(
-        fit=replace(fitted, source=replace(whole, changes=whole.changes[:, dwells.design.used])),
-        verification=whole.changes[:, ~dwells.design.used],
-        visible_share=lambda: dwells.design.visible_share(whole.changes[0]),
+        fit=replace(fitted, source=replace(source, changes=source.changes[:, dwells.design.used])),
+        verification=source.changes[:, ~dwells.design.used],
+        visible_share=lambda: dwells.design.visible_share(source.changes[0]),
     )
     wander = _of(tables.wander, unit)
     part = replace(

@@ -178,7 +178,7 @@ def norm_tables(done: FittedNorms, dwells: pd.DataFrame) -> dict[str, pd.DataFra
         ),
         "covariance": covariance_rows(done.measured.units, fit.fit.covariance),
         "residuals": _residual_rows(done, dwells),
-        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
+        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", integers="dwell other"),
         "wander": _wander_rows(done),
     }
 

@@ -106,9 +106,9 @@ def formula(body: RequestBody) -> JSONResponse:
     written = str(body.get("formula", "")).strip()
     with effects.additions_forgotten():
         (name,) = use_written_formulas([written], "formula")
-    kept = tuple(text for text in state.formula if text.partition("=")[0].strip().lower() != name)
+    others = tuple(text for text in state.formula if text.partition("=")[0].strip().lower() != name)
     added = tuple(effect for effect in state.added if effect != name)
-    return JSONResponse({"address": state.address(formula=(*kept, written), added=(*added, name))})
+    return JSONResponse({"address": state.address(formula=(*others, written), added=(*added, name))})
 
 
 def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:

@@ -60,8 +60,8 @@ def turned_to(settings: WorkbenchSettings, state: PlanPage, name: str, outer: fl
     TumblelineError
         There is no such pose, or the recipe cannot work with it there.
     """
-    kept = tuple(text for text in state.pose if next(iter(moves_of([text], "plan"))) != name)
-    new = state.model_copy(update={"pose": (*kept, f"{name}={outer:g},{inner:g}"), "edit": name})
+    others = tuple(text for text in state.pose if next(iter(moves_of([text], "plan"))) != name)
+    new = state.model_copy(update={"pose": (*others, f"{name}={outer:g},{inner:g}"), "edit": name})
     _recipe(settings, new)
     return new
 

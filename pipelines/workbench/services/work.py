@@ -114,8 +114,8 @@ def coefficients(request: Mapping[str, Any], report_progress: ReportProgress) ->
         report_progress(number, len(request["both"]), "fitting")
         dwells, history, judged = _inputs(side, "two models")
         told = {"kind": "dwell", "out_unit": "g"}  # what a file that lacks them means
-        whole = dwells.assign(**{name: text for name, text in told.items() if name not in dwells})
-        fitted, _, _ = fit_in_memory(LotTables(whole, history), [*(judged or ()), *side["added"]])
+        completed = dwells.assign(**{name: text for name, text in told.items() if name not in dwells})
+        fitted, _, _ = fit_in_memory(LotTables(completed, history), [*(judged or ()), *side["added"]])
         tables.append(fitted["coefficients"])
     return rows_of(changed(tables[0], tables[1], COEFFICIENT, "standard_error"))
 
