@@ -59,7 +59,7 @@ def set_up(name: str, folder: Path, *, asked: bool = False) -> None:
     """Make or complete the environment; says so where packages are installed.
 
     name : of the lock, ``requirements-NAME.lock``
-    asked : whether this version of Python was asked for, so that an environment of another one is made anew
+    asked : whether this version of Python was asked for, so that an environment of another version is made anew
     """
     lock = ROOT / f"requirements-{name}.lock"
     why = wrong_with(folder, asked=asked)
@@ -160,9 +160,9 @@ def _install(words: list[str], folder: Path, lock: Path, before: str | None) -> 
 
 
 def _compile(folder: Path) -> None:
-    """Compile the libraries on all processors, without tests of their own, which nobody runs here: an eleventh of the size."""
+    """Compile the libraries on all processors, without their tests, which nobody runs here: an eleventh of the size."""
     compiled = ["-m", "compileall", "-qq", "-j", "0", "-x", "/tests?/", *folder.glob("lib/python3*/site-packages")]
-    # a file that does not compile is one of another version of Python: its library does not import it
+    # a file that does not compile is for another version of Python: its library does not import it
     subprocess.run([folder / "bin" / "python", *compiled], stdout=subprocess.DEVNULL, check=False)  # noqa: S603
 
 

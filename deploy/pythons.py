@@ -30,7 +30,7 @@ class Interpreter(NamedTuple):
 
     @property
     def minor(self) -> int:
-        """The second number of a version of Python 3; -1 for another one."""
+        """The second number of a version of Python 3; -1 for other programs."""
         return int(self.version.split(".")[1]) if self.version.startswith("3.") else -1
 
 
@@ -90,7 +90,7 @@ def _probe(path: Path) -> Interpreter | None:
 
 
 def tried(interpreter: Interpreter, tests: str, folder: Path) -> Outcome:
-    """Set-up, main job and tests in a clone; the clone is removed, the output kept.
+    """Set-up, main job and tests in a clone; the clone is removed, its output remains.
 
     tests : folders or files; empty for all
     folder : of the clone, and of a link to the data that lie beside a checkout
@@ -134,7 +134,7 @@ def table(rows: list[tuple[str, ...]]) -> str:
 
 
 def main() -> int:
-    """Try every Python; 1 where one is not good."""
+    """Try every Python; 1 where any fails."""
     found = interpreters(os.environ.get("PYTHONS", ""))
     if not found:
         sys.stderr.write(

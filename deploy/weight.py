@@ -61,7 +61,7 @@ def closure(requirements: Iterable[str]) -> set[str]:
 
 
 def kind_of(licence: str) -> str:
-    """The kind of an unusual licence; empty for one that asks for its notice only, and for a choice with such a one."""
+    """The kind of an unusual licence; empty for a licence that asks for its notice only, and for a choice that includes one."""
     both = re.split(r" AND ", licence)  # each part holds; names after a comma are a choice, as OR is
     kinds = [[_kind(name) for name in re.split(r"\bOR\b|, ", part)] for part in both]
     return next((choice[0] for choice in kinds if all(choice)), "")
@@ -78,7 +78,7 @@ def _weight(part: str, packages: set[str]) -> Weight:
 
 @cache
 def megabytes(name: str) -> float:
-    """Size of the installed files of a package and of its compiled modules, those of its own tests left out, 10⁶ bytes."""
+    """Size of the installed files of a package and of its compiled modules, those of its tests left out, 10⁶ bytes."""
     held = installed(name)
     total = 0
     for file in (held.files or ()) if held is not None else ():

@@ -119,7 +119,7 @@ def decide(
     expanded = limits.coverage_factor * standard_uncertainty
     figure_limit = limits.figures[figure]
     least = figure_limit.min is not None
-    limit = figure_limit.min or figure_limit.max or 0.0  # a limit has one of both
+    limit = figure_limit.min or figure_limit.max or 0.0  # a limit has either of them
     if law is None:
         inner, outer = limit - guard, limit + guard
         risk = (below if least else outside)(value, standard_uncertainty, limit)

@@ -86,5 +86,5 @@ def exposure_profiles() -> list[str]:
 
 
 def load_exposure_profile(name: str) -> ExposureProfile:
-    """The built-in profile of this name; :class:`schemas.errors.RecipeInvalid` names close ones."""
+    """The built-in profile of this name; :class:`schemas.errors.RecipeInvalid` names similar profiles."""
     return built_in_profile(FOLDER, name, ExposureProfile)

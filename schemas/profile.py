@@ -189,11 +189,11 @@ class Profile(Strict):
         return self
 
     def register(self, name: str) -> Register:
-        """The register of that name; an unknown one is refused with what looks like it."""
+        """The register of that name; an unknown name is refused, with similar names."""
         return self._named(name, "register", self.registers)
 
     def command(self, name: str) -> Command:
-        """The command of that name; an unknown one is refused with what looks like it."""
+        """The command of that name; an unknown name is refused, with similar names."""
         return self._named(name, "command", self.commands)
 
     def _named(self, name: str, what: str, entries: Sequence[AnyEntry]) -> AnyEntry:

@@ -37,7 +37,7 @@ class StandardUncertainty(NamedTuple):
 class Entry(OnlyStated):
     """One entry of the budget.
 
-    rectangular : key of a half-width whose distribution is rectangular unless another one is stated; empty for none
+    rectangular : key of a half-width whose distribution is rectangular unless another distribution is stated; empty for none
     exact : what the entry does not state, or states as 0, is exactly 0; without this word a 0 counts as not stated
     """
 

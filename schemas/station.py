@@ -173,7 +173,7 @@ def refuse_untraced(stated: Uncertainty, references: Sequence[Reference], *, sim
 
 
 def with_faults(config: StationConfig, faults: Sequence[FaultOrder]) -> StationConfig:
-    """The station with faults beyond its file's; a station of hardware has trouble enough of its own."""
+    """The station with faults beyond its file's; :class:`WrongUse` for a station of hardware."""
     if not faults:
         return config
     if config.kind != "simulated" or config.simulation is None:

@@ -1,4 +1,4 @@
-"""The check of a table against its contract: the table with the right types, or one message with row, value and requirement."""
+"""The check of a table against its contract: the table with the right types, or a message with row, value and requirement."""
 
 from __future__ import annotations
 

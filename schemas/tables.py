@@ -88,7 +88,7 @@ def each(column: Column, *names: str) -> dict[str, Column]:
 
 
 def text(*allowed: str) -> Column:
-    """A text: one of the allowed ones, or any that is not empty."""
+    """A text: one of the allowed texts, or any that is not empty."""
     return Column("str", allowed=allowed, filled=not allowed)
 
 
@@ -110,7 +110,7 @@ _UNIT, _AXIS = each(text(), "unit"), each(text(*AXES), "axis")
 _RECORD = {**_UNIT, **each(WHOLE, "slot", "record"), "kind": text(*KINDS)}
 
 TABLES: dict[str, Table] = {
-    # Samples may hold NaN: what a device really sent is kept, and the validate stage refuses the unit.
+    # Samples may hold NaN: what a device really sent is stored, and the validate stage refuses the unit.
     "samples": Table({**_RECORD, "time_s": NUMBER, **each(GAPS, *AXES)}),
     "readings": Table(
         {
@@ -193,7 +193,7 @@ TABLES: dict[str, Table] = {
         },
         key=("unit", "axis"),
     ),
-    # of the coefficients, from earlier calibrations of the family; no rows without one
+    # of the coefficients, from earlier calibrations of the family; no rows without a prior
     "prior": Table(
         {
             **_UNIT,

@@ -63,7 +63,7 @@ def parse_as(kind: type[AnyModel], text: str, source: str, context: Any = None) 
 
 
 def _depth(content: Any) -> int:
-    """How deep lists and tables lie in one another, found without going down into them one by one."""
+    """How deep lists and tables lie in one another, found level by level, without recursion."""
     level, depth = [content], 0
     while level and depth <= DEEPEST:
         inner = [v for part in level for v in (part.values() if isinstance(part, dict) else part)]

@@ -228,7 +228,7 @@ class Uncertainty(Strict):
         return {**self.entries, **by_path}
 
     def comparison(self, role: str, frequency_hz: float) -> Comparison | None:
-        """What is stated of the equipment of a role at a frequency; NaN: a result of no one frequency, the first statement."""
+        """What is stated of the equipment of a role at a frequency; the first one for NaN (no single frequency)."""
         if role != "exciter":
             return self.shock_machine if role == "shock_machine" else None
         anywhere = math.isnan(frequency_hz)

@@ -1,4 +1,4 @@
-"""Opening a station: links, profiles and adapters put together; the one place that knows simulation from hardware."""
+"""Opening a station: links, profiles and adapters put together; here alone simulation is told from hardware."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def improve(
     effects : the model to begin with; None: the default model
     effect : effects to add, one per class of the diagnosis; none: each that is alone in its class
     fresh : the same units measured again; it judges the change
-    model_file : file to write, with the history of the model; None: none is kept
+    model_file : file to write, with the history of the model; None: no file is written
     """
     given = recording if isinstance(recording, Recording) else read(recording)
     again = None if fresh is None else fresh if isinstance(fresh, Recording) else read(fresh)

@@ -38,7 +38,7 @@ class Recording:
     """Dwells of one or several units, and how they came about.
 
     run : that holds them, in the archive that was named, else in one of this process
-    told : what was recognised, assumed and left out, as sentences · command : the import that says the same; empty for dwells
+    told : what was recognised, assumed and left out, as sentences · command : the equivalent import; empty for dwells
     """
 
     run: Run = field(repr=False)

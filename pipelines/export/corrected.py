@@ -88,8 +88,8 @@ class Corrected:
     force : (n, 3), g, zero across the axes
     covariance : (n, m, m), g², of the calibration; with a track also of the bias and of noise
     track : of the steps, and of the samples after the last whole step as one step without update
-    at_limits : the same with the upper limits (95 %) of the terms that the static record does not identify; None where it goes on
-    kept : what the next recording goes on with · white : (3,), g/√Hz, of the samples
+    at_limits : the track with upper limits (95 %) of the terms that the static record does not identify; None where it goes on
+    kept : the state from which the next recording continues · white : (3,), g/√Hz, of the samples
     bias, bias_covariance : at the samples; None without tracking
     outside : samples beyond the temperatures that were measured
     """
@@ -111,7 +111,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
 
     Parameters
     ----------
-    unit : may be empty where the run has one unit
+    unit : serial number; may be empty where the run has a single unit
     """
     missing = [name for name in ("coefficients", "covariance") if name not in run.tables()]
     if missing:

@@ -1,4 +1,4 @@
-"""A low-pass filter behind a correction: chosen from the measured bandwidth, run by sample, kept between files."""
+"""A low-pass filter behind a correction: chosen from the measured bandwidth, run by sample, its state stored between files."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def chosen_filter(
 
 @dataclass(frozen=True)
 class Kept:
-    """What is kept between two recordings of a unit: the filter's state (m, 3), or that of its bias, or both."""
+    """The stored state between two recordings of a unit: of the filter (m, 3), of the tracked bias, or of both."""
 
     unit: str
     time_s: float
@@ -84,7 +84,7 @@ def filtered(
 ) -> tuple[Corrected, Array]:
     """The correction with its force behind the filter, and the filter's state at the end.
 
-    After a gap in the recording, and at its beginning, the filter begins as one that has seen the first value for ever. The
+    After a gap in the recording, and at its beginning, the filter begins as if its input had always been the first value. The
     white noise of a sample, where the uncertainty includes it, falls by the filter's noise gain; what lasts longer passes.
     """
     rate, gap = rate_and_gaps(recording.time)
@@ -125,7 +125,7 @@ def filter_document(chosen: OutputFilter, source: str) -> FilterDocument:
 
 
 def read_state(path: Path, unit: str) -> Kept | None:
-    """What an earlier correction kept; None where there is no file yet.
+    """The state that an earlier correction stored; None where there is no file yet.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def _plain(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def filter_rate(recording: CorrectableRecording, begin: Kept | None) -> float:
-    """The rate of the samples, Hz; that of the kept filter where it is the same but for its last digits."""
+    """The rate of the samples, Hz; that of the stored filter where both agree but for the last digits."""
     rate = rate_and_gaps(recording.time)[0]
     if begin is None or begin.filter is None:
         return rate

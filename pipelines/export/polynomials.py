@@ -36,10 +36,10 @@ class UnitCalibration:
 
     bias : (4, m), output unit per K^k, coefficients of θ⁰ … θ³, of the m axes that have an output
     response : (4, m, 3), output unit per g and K^k
-    left_out : effects of the model that have no place in this form
+    left_out : effects of the model that this form cannot hold
     reasons : why it failed its limits; empty where it passed
     certificate : that the unit has for this run; None where it was not certified
-    noise : terms of its static record; None without one
+    noise : terms of its static record; None without that record
     full_scale : largest excursion of the output from 0 g, output unit; None where it is not recorded
     dwells : that the calibration is made from, those of verification left out
     nominal : output per g that the data sheet of this kind of device states, by its preset; None where no preset is known
@@ -68,7 +68,7 @@ class UnitCalibration:
 
     @property
     def with_every_axis(self) -> UnitCalibration:
-        """The calibration with three outputs: that of an axis without one is the force along it in g, 0 where it is not known."""
+        """The calibration with three outputs: for an axis without an output it is the force along it in g, 0 where unknown."""
         if self.bias.shape[-1] == len(AXES):
             return self
         axes = list(self.axes)
@@ -239,7 +239,7 @@ def revoked_units(run: Run) -> dict[str, validity.Calibration]:
 def _not_revoked(
     run: Run, chosen: list[str], certificates: Mapping[str, validity.Calibration], *, named: bool
 ) -> list[str]:
-    """Units whose calibration was not revoked; refused where one is named, or none is left."""
+    """Units whose calibration was not revoked; refused where a revoked unit is named, or no unit is left."""
     gone = [unit for unit in chosen if unit in certificates and certificates[unit].state == "revoked"]
     if gone and (named or len(gone) == len(chosen)):
         raise WrongUse(
@@ -268,7 +268,7 @@ def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> 
 
 
 def effects_left_out(calibration: Calibration) -> tuple[str, ...]:
-    """Effects of a model that have no place in polynomials of temperature."""
+    """Effects of a model that polynomials of temperature cannot hold."""
     return tuple(effect for effect in calibration.effects if effect not in {*BIAS, *SCALE, *ACROSS})
 
 

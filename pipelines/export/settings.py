@@ -112,7 +112,7 @@ class ExportSettings:
             raise WrongUse(f"--set counts_per_g: found {self.counts_per_g}, 1 or more is needed; correct it")
 
     def nominal_for(self, unit: UnitCalibration, what: str) -> float:
-        """The driver's output per g: the one given, else that of the unit's preset; refused where neither states it."""
+        """The driver's output per g: the given value, else that of the unit's preset; refused where neither states it."""
         nominal = unit.nominal if self.nominal is None else self.nominal
         if nominal is None or not nominal > 0.0:
             found = "none is given and no preset states it" if nominal is None else f"{nominal:g}"
@@ -129,7 +129,7 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
     Raises
     ------
     WrongUse
-        An identification is not a number, a unit is not exported, or two units have the same identification.
+        An identification is not a number, a unit is not exported, or two units share an identification.
     """
     ids: dict[str, int] = {}
     for part in filter(None, map(str.strip, text.split(","))):

@@ -44,7 +44,7 @@ class ConRelRes:
         Raises
         ------
         WrongUse
-            No n is that near. The published ranges end one below all ones.
+            No n is that near. The published ranges end one below the word whose bits are all set.
         """
         n = round(log(value / self.start) / log1p(2.0 * self.tolerance))
         highest = 2**self.bits - 2
@@ -206,7 +206,7 @@ def _letters(text: str) -> int:
 
 
 def _packed(parts: Iterable[tuple[int, int]]) -> bytes:
-    """Values of some bits each, one after another."""
+    """The (value, bits) pairs packed bit by bit, least significant first."""
     packed = at = 0
     for value, bits in parts:
         packed |= value << at

@@ -30,7 +30,7 @@ class UnitNoise:
     rate_hz: float
 
     def remark(self, symbol: str) -> str:
-        """Which axes have an upper limit in place of a value; empty where none has."""
+        """Remark on the axes that have an upper limit instead of a value; empty where no axis has."""
         limits = [axis for axis, known in zip(AXES, self.identified[symbol], strict=False) if not known]
         return f"upper limit (95 %), not identified: {', '.join(limits)}" if limits else ""
 

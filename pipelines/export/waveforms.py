@@ -1,4 +1,4 @@
-"""Waveforms of a record as files of other programs: the channels of a captured record, and one writer for each format.
+"""Waveforms of a record as files of other programs: the channels of a captured record, and a writer for each format.
 
 A writer gives the bytes of the file, so that all formats are written in one way: complete or not at all.
 """

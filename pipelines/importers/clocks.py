@@ -1,7 +1,7 @@
 """Seconds from the time of a foreign file: stamps of date and time, Unix time, counters in s, ms, µs or ns.
 
 The unit of a counter is what the file states, else what its steps allow; if they allow several, it must be given. A given unit
-that contradicts the file is refused; one that contradicts the steps gives a remark.
+that contradicts the file is refused; a unit that contradicts the steps gives a remark.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ def clock(numbers: Array, name: str, claimed: str, stated: str, where: str) -> R
     Raises
     ------
     WrongUse
-        Several units are possible, or the one given contradicts the file.
+        Several units are possible, or the given unit contradicts the file.
     """
     recognition = recognised(numbers, name, stated)
     column, step = f"column '{shown(name)}'", typical_step(numbers)

@@ -67,7 +67,7 @@ INERTIAL = ("acc", "imu")
 
 
 def chosen(groups: Sequence[tuple[str, int]], group: str, where: str, missing: str = "") -> str:
-    """The group of channels to read: the one given, or the only one.
+    """The group of channels to read: the given group, or the only group.
 
     Parameters
     ----------

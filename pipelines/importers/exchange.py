@@ -126,7 +126,7 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
 
 
 def _refuse_half_an_axis(frame: pd.DataFrame, where: str) -> None:
-    """Refuse a table without an output, and one whose output of an axis has another name."""
+    """Refuse a table without an output, and a table whose output of an axis has another name."""
     axes = output_axes(frame.columns)
     if not axes:
         _require(frame, OUTPUT_COLUMNS, where)

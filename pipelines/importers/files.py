@@ -41,7 +41,7 @@ class SourceFile:
 
 
 def digest_of(sources: Sequence[SourceFile]) -> str:
-    """The hash of several files as one source."""
+    """The hash of several files that are read as a single source."""
     return hashlib.sha256("".join(source.sha256 for source in sources).encode()).hexdigest()
 
 

@@ -1,6 +1,6 @@
 """The process that reads files of persons: it takes a function and its arguments, and sends the result or the error.
 
-The limit of memory is beyond what the process has when it begins: libraries take address space of their own.
+The limit of memory is beyond what the process has when it begins: libraries take address space too.
 """
 
 from __future__ import annotations

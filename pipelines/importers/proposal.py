@@ -43,7 +43,7 @@ _KEYS = (
 class Proposal:
     """Keys of the mapping of an import, and the fit (empty: none); what was assumed, and remarks; count of stops.
 
-    places : positions that lie apart, up to what a fit needs
+    places : number of positions that lie apart, up to what a fit needs
     """
 
     keys: dict[str, Any]

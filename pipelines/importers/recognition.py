@@ -255,7 +255,7 @@ def _stops(output: Array, time: Array, unit: str, joints: Sequence[int] = ()) ->
 
 
 def _edges(time: Array, joints: Sequence[int] = ()) -> list[int]:
-    """The samples before which time has a gap or another file begins, with the first and one past the last."""
+    """The samples before which time has a gap or another file begins, with the first sample and the index past the last."""
     steps = np.diff(time)
     return sorted({0, *(np.flatnonzero(steps > gap_limit(steps)) + 1).tolist(), *joints, len(time)})
 

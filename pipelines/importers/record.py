@@ -133,7 +133,7 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
 def _with_numbers(
     columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content
 ) -> tuple[Index, dict[str, pd.Series], tuple[str, ...]]:
-    """Rows that are kept (k,), the columns with these rows, and a remark on the others, which lack a number."""
+    """Indices (k,) of the rows that have every number, the columns with these rows, and a remark on the others."""
     count = len(next(iter(columns.values())))
     if mapping.gaps == "refuse":
         return np.arange(count), columns, ()

@@ -1,4 +1,4 @@
-"""Messages of ROS as columns: nested fields by their path, arrays by element, the time of the header where there is one."""
+"""Messages of ROS as columns: nested fields by their path, arrays by element, the time of the header where it is stamped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Samples that an axis repeats, and torn words: refused, left out or kept, by the mapping."""
+"""Samples that an axis repeats, and torn words: refused, left out or used, by the mapping."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def sound_dwells(
 
 
 def refuse_or_remark(faults: SampleFaults, output: Array, time: Array, mapping: Mapping, where: str) -> tuple[str, ...]:
-    """Remarks on the faults that are left out or kept.
+    """Remarks on the faulty samples that are left out or used.
 
     Raises
     ------

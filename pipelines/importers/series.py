@@ -107,12 +107,12 @@ def _recognised(path: Path, columns: Sequence[str]) -> tuple[str, str, Sequence[
 
 
 def series_of_run(run: Run, record: int | None) -> EvenSeries:
-    """The longest stretch at rest of an import's samples, or the one with the given number.
+    """The longest stretch at rest of an import's samples, or the stretch with the given number.
 
     Raises
     ------
     WrongUse
-        The run has no samples of its own, or no such stretch.
+        The run has no samples, or no such stretch.
     """
     if "samples" not in run.tables():
         raise WrongUse(

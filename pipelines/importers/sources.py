@@ -117,7 +117,7 @@ def _at(times: pd.Series, clock: pd.Series, data: pd.Series, where: str) -> Arra
 
 
 def _instants(column: pd.Series, where: str) -> Array:
-    """Numbers that grow with time, the same for the same instant in every file."""
+    """Numbers that grow with time and are equal for the same instant in every file."""
     if column.dtype.kind in "fiu":
         return column.to_numpy(dtype=np.float64)
     moments = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")

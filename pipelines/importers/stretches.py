@@ -48,7 +48,7 @@ _AT_REST = 0.5
 
 @dataclass(frozen=True)
 class Stretches:
-    """Static stretches: first and one past the last sample, and label of each; remarks on how they were found."""
+    """Static stretches: first sample and index past the last, and label of each; remarks on how they were found."""
 
     spans: tuple[tuple[int, int], ...]
     labels: tuple[str, ...]
@@ -153,7 +153,7 @@ def _best_stops(output: Array, time: Array, edges: Sequence[int], gravity: float
     best = _longest(clean) if clean else None
     if best and (len(best.found) >= _ENOUGH or not any(stops.several for stops in fit)):
         return best
-    # a hand that rests for a moment shakes little less than one that moves: stricter limits part what it runs together
+    # a hand that rests for a moment shakes little less than a moving hand: stricter limits part what it runs together
     strict = [
         _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")), gravity)
         for window, sd in quiet.items()

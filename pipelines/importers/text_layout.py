@@ -42,7 +42,7 @@ class Layout:
     names : of the columns; empty if no line names them
     header : index of the line with the names; −1 if there is none, or if it is a comment
     integers : whether the names are only the numbers 0, 1, 2, …
-    units : of the columns by a line of their own below the names; empty otherwise
+    units : of the columns, from a separate line below the names; empty otherwise
     width : count of fields, a last empty one not counted
     trailing : whether every line ends with a divider
     """
@@ -146,7 +146,7 @@ def _numeric_columns(sample: Sequence[str], divider: str, decimal: str, width: i
 def _first_row(
     lines: Sequence[str], filled: Sequence[int], divider: str, decimal: str, width: int, numeric: list[bool]
 ) -> int:
-    """The first line of the table: like the sampled ones, with the broken rows right above it, which are rows too."""
+    """The first line of the table: like the sampled rows, with the broken rows right above it, which are rows too."""
     if not any(numeric):
         return filled[1] if len(filled) > 1 else len(lines)  # names alone
     alike = (index for index, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
@@ -178,7 +178,7 @@ def _is_header(row: list[str], width: int, decimal: str, *, trailing: bool) -> b
 
 
 def _are_units(row: list[str], above: list[str]) -> bool:
-    """Whether a line below the names holds units: shorter words, often the same, and the names all different."""
+    """Whether a line below the names holds units: shorter words, often repeated, while the names are all different."""
     words = [word.strip("[]()") for word in row if word]
     return (
         len(set(above)) == len(above)

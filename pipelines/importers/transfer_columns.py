@@ -142,7 +142,7 @@ def _own_name(meaning: str) -> str:
 
 
 def _columns(table: pd.DataFrame, layout: PointsLayout) -> dict[str, str]:
-    """The column of each meaning: as it is mapped, else the only one that its name shows to be it."""
+    """The column of each meaning: as it is mapped, else the only column whose name shows the meaning."""
     found = {meaning: [str(name) for name in table.columns if _meaning(str(name)) == meaning] for meaning in UNITS}
     only = {meaning: names[0] for meaning, names in found.items() if len(names) == 1}
     numbered = {meaning: _named(table, column) for meaning, column in layout.columns.items()}
@@ -189,7 +189,7 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
 
 
 def _plain(unit: str) -> str:
-    """A unit as :data:`UNITS` has it; another one as it is."""
+    """A unit as :data:`UNITS` spells it; an unknown unit unchanged."""
     return ALIKE.get(unit.strip().lower(), unit.strip())
 
 

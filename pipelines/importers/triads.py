@@ -48,7 +48,7 @@ _CLEAR_COUNTS, _CLEAR_RATIO = 250.0, 30.0
 """Size of whole numbers at rest, and over their scatter: the bias of a gyroscope is smaller."""
 _MOST = 60
 _JUMP = 0.2
-_CELL, _FEWEST_PLACES = 0.1, 5
+_CELL, _FEWEST_CELLS = 0.1, 5
 """Size of a place over the range of the parts; places that a sphere needs: it has four numbers."""
 
 
@@ -192,8 +192,8 @@ def _fitted(parts: Array, output: Array) -> Sphere:
     pose = Sphere(max(size, 1e-300), np.zeros(3), np.inf, np.sort(spans) / max(size, 1e-300), jumps / max(size, 1e-300))
     if not np.max(spans) > 0.0:
         return pose
-    parts = _places(parts, _CELL * float(np.max(spans)))
-    if len(parts) < _FEWEST_PLACES:
+    parts = _cell_means(parts, _CELL * float(np.max(spans)))
+    if len(parts) < _FEWEST_CELLS:
         return pose
     unit, middle, used = float(np.max(spans)), parts.mean(axis=0), parts
     centre, radius, away = middle, size, np.zeros(len(parts))
@@ -212,8 +212,8 @@ def _fitted(parts: Array, output: Array) -> Sphere:
     return replace(pose, misfit=misfit)
 
 
-def _places(parts: Array, size: float) -> Array:
-    """One mean for each place (k, 3) where parts lie, so that long rests at one of them do not decide."""
+def _cell_means(parts: Array, size: float) -> Array:
+    """Mean (k, 3) of the parts in each cell of the grid that has some, so that long rests in a cell do not decide."""
     cells = np.unique(np.rint((parts - parts.min(axis=0)) / size), axis=0, return_inverse=True)[1].ravel()
     count = np.bincount(cells)
     return np.stack([np.bincount(cells, weights=parts[:, k]) / count for k in range(3)], axis=1)
@@ -288,5 +288,5 @@ def is_row_number(numbers: Array) -> bool:
 
 
 def are_positions(sphere: Sphere | None, rows: int) -> bool:
-    """Whether neighbouring rows are so far apart that each is a position of its own, not a sample of a record."""
+    """Whether neighbouring rows are so far apart that each is a separate position, not a sample of a record."""
     return sphere is not None and rows <= _FEW_ROWS and sphere.fits and sphere.jumps > _JUMP

@@ -62,7 +62,7 @@ def import_waveforms(
     layout: RecordingLayout,
     archive: str | None = None,
 ) -> WaveformImport:
-    """Figures and findings of a procedure from the recordings of one unit, one file a record; kept as a run of the archive.
+    """Figures and findings of a procedure from the recordings of one unit, one file a record; stored as a run of the archive.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[s
 
 
 def _scaled(part: Any, procedure: FromWaveforms, out_unit: str, path: Path | None) -> Any:
-    """The part with a scale: one is stated, or follows from an output that is an acceleration.
+    """The part with a scale: the scale is stated, or follows from an output that is an acceleration.
 
     A recording made elsewhere has no multi-position test that determines it.
     """
@@ -203,7 +203,7 @@ def _scaled(part: Any, procedure: FromWaveforms, out_unit: str, path: Path | Non
 
 
 class _Recording(NamedTuple):
-    """One file: the unit, the reference (None without one), the unit of the output, and the source."""
+    """One file: the unit, the reference (None without it), the unit of the output, and the source."""
 
     samples: UnitRecord
     reference: UnitRecord | None
@@ -250,7 +250,7 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
 
 
 def _unit(content: Content, layout: RecordingLayout, meaning: str, column: str, where: str) -> str:
-    """Unit of a channel: as stated by the command, else by the file; one that neither states is refused."""
+    """Unit of a channel: as stated by the command, else by the file; a unit that neither states is refused."""
     stated = content.units.get(column, "") or unit_in(column)
     given = layout.units.get(meaning, "")
     if not (given or stated):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ImprovedTables:
-    """Dwells and temperatures of the run, and of the fresh run where there is one."""
+    """Dwells and temperatures of the run, and of the fresh run where it was measured."""
 
     dwells: pd.DataFrame
     history: pd.DataFrame | None
@@ -31,7 +31,7 @@ class ImprovedTables:
 
 
 class Attendant:
-    """Who sees an improvement and answers its questions: nobody here, a terminal or pages in a class of their own."""
+    """Who sees an improvement and answers its questions: nobody here, a terminal or pages in a subclass."""
 
     def working(self, what: str) -> AbstractContextManager[Any]:
         """Shows what is computed, until it is done."""
@@ -48,12 +48,12 @@ class Attendant:
         return not others
 
     def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
-        """Name, dwells and temperatures of a fresh run that is there or is measured now; None without one."""
+        """Name, dwells and temperatures of a fresh run that is there or is measured now; None without a fresh run."""
         return None
 
 
 def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str, ModelFile | None]:
-    """The text of a model file with one version more per step, and its model; None without a step."""
+    """The text of a model file with one version more per step, and its model; None where no step is given."""
     from pipelines.jobs.model_files import extended
 
     model = None
@@ -127,7 +127,7 @@ class Improvement:
         }
 
     def _with_fresh(self, *, changed: bool) -> tuple[ImprovedTables, str]:
-        """The tables with those of a fresh run, and its name; a changed model is judged by one where there may be one."""
+        """The tables with those of a fresh run, and its name; a fresh run judges a changed model where it can be measured."""
         if self.fresh or not changed:
             return self.tables, self.fresh
         found = self.attendant.fresh_run()

@@ -1,4 +1,4 @@
-"""A recording of another system as a run of the archive: recognised, imported and fitted, with the command that says the same."""
+"""A recording of another system as a run of the archive: recognised, imported and fitted, with the equivalent command."""
 
 from __future__ import annotations
 

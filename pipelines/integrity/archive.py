@@ -42,7 +42,7 @@ READERS_OF_OBJECTS = 32  # an object store answers slowly, but many requests at 
 class Report:
     """Result of a verification.
 
-    head : hash of the last entry of the chain; a copy of it, kept elsewhere, shows later whether entries were removed.
+    head : hash of the last entry of the chain; a copy of it elsewhere shows later whether entries were removed.
     trust : sentence about the signatures.
     """
 
@@ -98,7 +98,7 @@ def verify(
     runs : only these runs and their captures; the whole archive where empty.
     keys : public keys that are trusted, by name.
     demanded : whether a manifest without a signature by one of these is wrong.
-    head : hash of an entry of the chain from a copy kept elsewhere.
+    head : hash of an entry of the chain from a copy elsewhere.
     also : further checks of the whole archive, of tables that this package does not know.
     """
     open_still = _being_written(archive, runs)

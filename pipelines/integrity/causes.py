@@ -45,7 +45,7 @@ def by_cause(
 def _without_disagreements(
     causes: dict[str, IntegrityFinding], by_path: Mapping[str, Sequence[IntegrityFinding]], differing: Collection[str]
 ) -> None:
-    """List a file that only disagrees with others, and is as it was sealed, under the other one."""
+    """List a file that is as it was sealed, and only disagrees with another, under that other file."""
     for path in list(causes):
         links = [finding.because for finding in by_path.get(path, ())]
         if path not in causes or path in differing or not links or not all(links):
@@ -86,7 +86,7 @@ def _by_folder(
 
 
 def _joined(findings: list[IntegrityFinding]) -> IntegrityFinding:
-    """The findings of one path as one: an invalid signature first, then the first finding."""
+    """The findings of a path joined: an invalid signature first, then the first finding."""
     first = min(findings, key=lambda finding: finding.kind != SIGNATURE)
     return _with(first, [finding for finding in findings if finding is not first])
 

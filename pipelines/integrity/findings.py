@@ -29,7 +29,7 @@ class IntegrityFinding:
     kind : ``changed``, ``missing``, ``edited``, ``foreign``, ``newer``, ``unreadable``, ``signature`` or ``unchained``.
     path : the file, below the archive's root.
     consequences : sentences about further findings with this cause.
-    because : a file that this one disagrees with; where only that one was edited, the finding is a consequence of it.
+    because : a file that this file disagrees with; where only that file was edited, the finding is a consequence of it.
     """
 
     kind: str
@@ -79,7 +79,7 @@ class VerifiedPart:
         return {name: getattr(self, name) for name in ("tables", "manifests", "rows", "bytes")}
 
     def name(self, path: Place) -> str:
-        """The name of a place relative to the root of the archive."""
+        """The path relative to the root of the archive, as text."""
         return str(path)[len(str(self.root)) :].lstrip("/\\")
 
     def wrong(self, kind: str, path: Place, message: str, because: Place | None = None) -> None:
@@ -154,7 +154,7 @@ def _read(path: Place) -> tuple[str, int | None, int]:
 
 
 def _is_inside(path: Place) -> bool:
-    """Whether a file is one of a store or of a pack, which Arrow does not find by its name."""
+    """Whether a file lies in an object store or in a pack, which Arrow does not find by its name."""
     return isinstance(path, ObjectPath) or member_of(path) is not None
 
 

@@ -50,7 +50,7 @@ def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = N
     """Read and check the chain; findings go into ``checked``.
 
     only : runs whose sealed files are checked; all where None.
-    head : hash of an entry from a copy kept elsewhere; it must exist.
+    head : hash of an entry from a copy elsewhere; it must exist.
     """
     before, seen, chain, latest = "", set[str](), Chain(), ""
     for number, path in hash_chain.entries(root):

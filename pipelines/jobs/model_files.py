@@ -170,7 +170,7 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
 
 
 def reduced(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
-    """The text of the next version of a model without an effect, its comments kept, and the model as it then is.
+    """The text of the next version of a model without an effect, with its comments, and that version of the model.
 
     Raises RecipeInvalid: the text is no model, the effect is not in it, or it is the only one.
     """

@@ -130,7 +130,7 @@ def stored_family(recipe: Recipe, default: Archive, units: set[str], kind: str) 
     ----------
     default : the archive where none is named
     units : those of the lot
-    kind : of the station: simulated units say nothing of real ones
+    kind : of the station: simulated units say nothing of real units
 
     Raises
     ------
@@ -159,14 +159,14 @@ def stored_family(recipe: Recipe, default: Archive, units: set[str], kind: str) 
 
 
 def planned_precision(recipe: Recipe, archive: str | None, kind: str) -> Array | None:
-    """Precision (m, p, p) of the prior of a recipe that is planned, 1/g²; None without one.
+    """Precision (m, p, p) of the prior of a recipe that is planned, 1/g²; None without a prior.
 
     Where all units that the recipe names have earlier calibrations, it is that of the least known of them. Outputs become g by
     the scale of the family.
 
     Parameters
     ----------
-    archive : address; the default one where None
+    archive : address; the default archive where None
     """
     stored = stored_family(recipe, Archive(archive), set(recipe.units), kind)
     found = family(stored)

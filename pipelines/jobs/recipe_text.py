@@ -22,7 +22,7 @@ def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
 
     remarks : lines for the head of the file, without the sign of a remark
 
-    Raises WrongUse: the model has formulas of its own, which only a model file can hold.
+    Raises WrongUse: the model has formulas, which only a model file can hold.
     """
     if recipe.formulas:
         raise WrongUse(
@@ -70,7 +70,7 @@ def _angles(pose: Pose) -> list[float]:
 
 
 def limits_from(limits: str, home: Path, folder: Path) -> str:
-    """A recipe's limits as a recipe in another folder names them: built-in ones by name, a file by its way from there."""
+    """A recipe's limits as a recipe in another folder names them: built-in limits by name, a file by its path from there."""
     beside = home / limits
     return os.path.relpath(beside, folder) if beside.is_file() else limits
 

@@ -1,8 +1,8 @@
 """Releases of models to the line: records in the archive that are never changed, and the evidence for them.
 
 Every record has its scope (device, station) and its first day of use. A record for the same device and station has priority over
-one for the device only, and this over one for all; among records of equal scope the one with the latest date that is not in the
-future applies, and of two with the same date the one that was written last.
+a record for the device only, and this over a record for all; among records of equal scope that with the latest date not in the
+future applies, and of two with the same date that written last.
 """
 
 from collections.abc import Mapping
@@ -82,7 +82,7 @@ def keep_evidence(archive: Archive, change: ModelChange, document: Mapping[str, 
 
 
 def evidence_for(archive: Archive, change: ModelChange, device: str, station: str) -> dict[str, Any] | None:
-    """The newest what-if of a model with lots of this device and station; None without one."""
+    """The newest what-if of a model with lots of this device and station; None where there was none."""
     model = model_digest(change)
     matches: list[dict[str, Any]] = []
     for path in (archive.root / EVIDENCE).glob(f"{model[:10]}-*.json"):
@@ -157,7 +157,7 @@ def releases(archive: Archive) -> list[Release]:
 
 
 def released(archive: Archive, device: str, station: str, when: datetime) -> Release | None:
-    """The record of the line's model for a device and station at a time; None without one."""
+    """The record of the line's model for a device and station at a time; None where no record applies."""
     matching = [
         record for record in releases(archive) if _matches(record.device, device) and _matches(record.station, station)
     ]
@@ -190,7 +190,7 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
 
 
 def planned_recipe(name: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
-    """The recipe to be planned, with another model where one is given; the archive is read only for the line's model.
+    """The recipe to be planned, with another model where that is given; the archive is read only for the line's model.
 
     effects, model : a list of effects, or a model file; empty or None if not given
     """

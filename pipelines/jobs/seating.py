@@ -22,7 +22,7 @@ LONGEST_SLOT = 4
 
 @dataclass(frozen=True)
 class Seating:
-    """Serial numbers, and the slot of each from a slot map; without one the units sit in the slots from 0 on."""
+    """Serial numbers, and the slot of each from a slot map; without a map the units sit in the slots from 0 on."""
 
     units: tuple[str, ...] = ()
     slots: tuple[int, ...] = ()

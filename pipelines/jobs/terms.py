@@ -88,7 +88,7 @@ def refuse_unusable_stop(recipe: Recipe, station: StationConfig, limits: Limits)
     """Refuse a ``[stop]`` that could never end the lot, or of which a key could never do what it says.
 
     Raises RecipeInvalid: it has no poses, asks for effects that the dwells can never show, for less than the references allow,
-    or for dwells no longer than the planned ones.
+    or for dwells no longer than planned.
     """
     terms = recipe.stop
     if terms is None:

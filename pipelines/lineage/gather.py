@@ -13,7 +13,7 @@ from pipelines.lineage.graph import Graph, Node, ProvActivity
 
 MADE = ("who", "where", "when", "code", "key", "software", "libraries", "schema", "parameters", "taken_from")
 RAW = "records"
-ELSEWHERE = {"recipe", "limits", "station", "signature"}  # parts of ``run.json`` with nodes of their own, or none
+ELSEWHERE = {"recipe", "limits", "station", "signature"}  # parts of ``run.json`` with separate nodes, or none
 
 
 class Gatherer:

@@ -13,7 +13,7 @@ STATED = ("code", "key", "schema", "reason", "taken_from")  # of a step, in exch
 class Node:
     """A node of the graph, also in the JSON document.
 
-    id : unique; for a file of the archive its place below the root
+    id : unique; for a file of the archive its path below the root
     kind : ``certificate``, ``table``, ``report``, ``samples``, ``source``, ``run``, ``recipe``, ``limits``, ``station`` or
     ``reference``; label : the name in trees and pages; sha256 : hash of the file; about : further properties
     """

@@ -27,7 +27,7 @@ def write_crate(archive: Archive, traced: Lineage, folder: Path) -> int:
         )
     contents = _contents(archive, traced.graph)
     for name in contents:
-        if not is_below(name):  # readable manifests never name such a place
+        if not is_below(name):  # readable manifests never name such a path
             raise ArchiveUnusable(
                 f"lineage: {name!r} is a path outside the crate's folder, a path inside it is needed; do not use this archive"
             )

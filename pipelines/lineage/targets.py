@@ -81,7 +81,7 @@ def _of_run(archive: Archive, run: Run) -> Lineage:
 
 
 def _of_file(archive: Archive, target: str) -> Lineage:
-    """A file by its place in the archive, else by its content."""
+    """A file by its path in the archive, else by its content."""
     gatherer = Gatherer(archive)
     path = _below(archive, target)
     for name in _runs_of(archive, path):

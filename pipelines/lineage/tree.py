@@ -64,7 +64,7 @@ class _Drawer:
             self._used(branch.add(_step(step, self._versions(step))), step)
 
     def _versions(self, step: ProvActivity) -> str:
-        """Versions of program and libraries; empty where they are the same as those shown last."""
+        """Versions of program and libraries; empty where they are those shown last."""
         known = {**step.about.get("software", {}), **step.about.get("libraries", {})}
         text = " ".join(f"{name} {number}" for name, number in known.items())
         before, self.versions = self.versions, text or self.versions

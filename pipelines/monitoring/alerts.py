@@ -130,7 +130,7 @@ def _of_discoveries(folder: Path, now: datetime) -> Iterator[Alert]:
 
 
 def _newest(folder: Path, kind: str, key: str, now: datetime) -> list[dict[str, Any]]:
-    """A list of the newest document of a kind; empty where there is none, or an old one."""
+    """A list of the newest document of a kind; empty where there is no document, or an old one."""
     newest = max(folder.glob(f"{kind}-*.json"), key=lambda path: path.name, default=None)
     if newest is None or now - datetime.fromtimestamp(newest.stat().st_mtime, UTC) > AUDIT_AGE:
         return []

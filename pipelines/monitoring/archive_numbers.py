@@ -53,7 +53,7 @@ class LineNumbers:
 class ArchiveNumbers:
     """Numbers of an archive.
 
-    lag_s : time since the end of the oldest finished run that is not in the chain yet, s; 0 without one
+    lag_s : time since the end of the oldest finished run that is not in the chain yet, s; 0 where all are
     free_bytes : free space on its disk; None for an object store
     due : number of units whose certificate ends within a period, by the period in days
     """

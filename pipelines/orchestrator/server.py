@@ -128,7 +128,7 @@ def _left(home: Path) -> bool:
 
 
 def any_client(home: Path) -> bool:
-    """Whether a living process uses the server; files of dead ones are removed."""
+    """Whether a living process uses the server; files of dead processes are removed."""
     alive = False
     for path in (home / CLIENTS).glob("*"):
         with path.open("a") as file:

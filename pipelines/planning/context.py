@@ -34,7 +34,7 @@ class PlanContext:
     activities : what the station does and when
     state : the planned dwells of the fit, (n,)
     covariance : (n, n), of the dwell means, g²
-    prior : (axes, p, p), precision of a prior of the model's coefficients, 1/g²; None without one
+    prior : (axes, p, p), precision of a prior of the model's coefficients, 1/g²; None without a prior
     """
 
     recipe: Recipe
@@ -108,7 +108,7 @@ def with_verification_hint(text: str, activities: Sequence[Activity], station: S
 
 
 def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
-    """Noise of a preset, with given values in place of the preset's.
+    """Noise of a preset, with given values instead of the preset's.
 
     device : preset; the recipe's device where it is empty
     density : white noise, µg/√Hz · wander : flicker floor of the Allan deviation, µg

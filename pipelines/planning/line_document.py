@@ -76,7 +76,7 @@ def _best(line: Line, phases: Sequence[Sequence[Phase]]) -> tuple[Line, Shortest
 
 
 def free_places(spans: Sequence[tuple[int, int]]) -> list[int]:
-    """For each (begin, end) the lowest place, from 0, that is free at its begin."""
+    """Index, from 0, of the first fixture that is free at the begin of each (begin, end)."""
     until: list[int] = []
     places = [0] * len(spans)
     for number in sorted(range(len(spans)), key=lambda k: spans[k]):

@@ -60,7 +60,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Shortest:
-    """The lots in the order given, the steps until the last one is unloaded, and the bound below which no schedule is."""
+    """The lots in the order given, the steps until the last lot is unloaded, and the bound below which no schedule is."""
 
     lots: list[Placed]
     makespan: int
@@ -113,7 +113,7 @@ def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:
     cp = library("ortools.sat.python.cp_model", "schedule", f"line {line.name}: the shortest schedule")
     model = _Model(cp, line, lots)
     solver = cp.CpSolver()
-    # one thread, and work counted in place of seconds: the same schedule on every machine
+    # one thread, and work counted instead of seconds: the schedule does not depend on the machine
     solver.parameters.num_workers, solver.parameters.linearization_level, solver.parameters.random_seed = 1, 2, 1
     solver.parameters.max_deterministic_time = WORK
     model.cp.minimize(model.makespan)
@@ -167,7 +167,7 @@ class _Model:
         self._in_order(lots)
 
     def _one_by_one(self, lots: Sequence[Sequence[Phase]]) -> int:
-        """Steps in which the lots are done one after the other, with every change."""
+        """Steps in which the lots are done in sequence, with every change."""
         return sum(
             self.load
             + self.unload
@@ -201,7 +201,7 @@ class _Model:
         """Begin of loading, of each phase and of unloading of a lot."""
         load = self._time(self.load)
         self.hands.append(self.cp.new_fixed_size_interval_var(load, self.load, ""))
-        end = free = load + self.load  # end of the phase before; of the last one in which the lot cannot be moved
+        end = free = load + self.load  # end of the phase before; of the last phase in which the lot cannot be moved
         begins: list[Any] = []
         for phase, stay in zip(phases, stays(self.line, phases), strict=True):
             length, begin = step_count(phase.seconds), self._time()

@@ -87,7 +87,7 @@ def optimise(
 
     tolerance : ratio to the requirement up to which the nearest recipe is returned where none meets it, provided that it is
         quicker than the textbook plan
-    ramp : whether the devices are measured while the chamber ramps, in place of soaks
+    ramp : whether the devices are measured while the chamber ramps, instead of in soaks
     Raises RecipeInvalid: no recipe that was tried meets the requirement; the message gives the smallest ratio reached.
     """
     search = RecipeSearch(recipe, against, requirement, ramp=ramp)
@@ -144,7 +144,7 @@ class RecipeSearch:
         """Designs with the fewest dwells in the best orders of soaks, and their station times in s, the quickest first."""
         soak_orders = orders(self.requirement, self.against.station, self.recipe.soak_min_s, ramp=self.ramp)
         dwell_s = self.timed.dwell_lengths()[0]
-        # ramps are few, and one that does not get far enough says nothing of a longer one
+        # ramps are few, and a ramp that does not get far enough says nothing of a longer ramp
         likely = [(0.0, order) for order in soak_orders]
         if not self.ramp:
             likely = sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
@@ -193,7 +193,7 @@ class RecipeSearch:
         return (math.inf, plan) if fewest is None else (self.timed.ratio_and_seconds(fewest)[1], fewest)
 
     def best(self, plan: PlanDesign, best: PlanContext | None) -> PlanContext | None:
-        """The quicker of the best recipe so far and the one found by exchanges in the soaks of a design."""
+        """The quicker of the best recipe so far and that found by exchanges in the soaks of a design."""
         now: PlanDesign | None = plan
         for _ in range(ROUNDS):
             if now is None or sum(now.counts) > MOST or self.slower(now, best):

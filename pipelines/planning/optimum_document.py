@@ -1,4 +1,4 @@
-"""The document of a recipe search: the recipe found beside the one that the search started from and the textbook plan."""
+"""The document of a recipe search: the recipe found beside that from which the search started and the textbook plan."""
 
 from collections import Counter
 from typing import Any

@@ -106,7 +106,7 @@ def _against_means(context: PlanContext, square: Array, gain: Array) -> tuple[Ar
 def _bias(
     context: PlanContext, expected: Expected, of_record: Array, terms: BudgetTerms | None
 ) -> dict[str, float | str | None] | None:
-    """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None for a model without one.
+    """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None without a bias.
 
     See :func:`pipelines.stages.uncertainty.bias_measurands.bias_measurands`.
     """
@@ -152,7 +152,7 @@ def missing(state: State, effects: Sequence[str]) -> str:
         visibility = visibilities(state, rest, 1.0, [effect])
         if visibility and visibility[0].remaining_fraction <= SEEN:
             reasons[effect] = reason(state, effect, rest)
-    # of mutually confounded effects only the last one is reported: without it the others are identified
+    # of mutually confounded effects only the last is reported: without it the others are identified
     mutual = len(reasons) > 1 and any(visibilities(state, ("bias",), 1.0, [e])[0].seen for e in reasons)
     chosen = list(reasons)[-1:] if mutual else list(reasons)
     return "; ".join(f"{effect} cannot be identified: {reasons[effect]}" for effect in chosen)

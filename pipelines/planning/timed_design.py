@@ -80,7 +80,7 @@ class TimedDesign:
         self._verification = len({(p.outer_deg, p.inner_deg) for p in recipe.verification})
 
     def dwell_lengths(self) -> tuple[float, ...]:
-        """Lengths of a dwell to try, s: the one with most information per time, and three and nine times that.
+        """Lengths of a dwell to try, s: the length with most information per time, and three and nine times that.
 
         Where slow wander dominates, the total time counts and not the number of dwells; longer dwells then need fewer records.
         """
@@ -324,7 +324,7 @@ def _shifted(counts: tuple[int, ...], step: int) -> Iterator[tuple[int, ...]]:
 def smallest_passing(passes: Callable[[int], bool], low: int, high: int) -> int | None:
     """The smallest number from low to high that passes, by bisection; None where ``high`` fails.
 
-    Every number above one that passes must pass, too.
+    Every number above a passing number must pass, too.
     """
     if not passes(high):
         return None

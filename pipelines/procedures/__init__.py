@@ -46,7 +46,7 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     Raises
     ------
     IncompleteProcedure
-        A module has no PROCEDURE, or one that declares what it cannot do, or two have one figure.
+        A module has no PROCEDURE, a procedure declares what it cannot do, or two procedures declare the same figure.
     """
     procedures: list[Procedure] = []
     for info in iter_modules(path):

@@ -239,7 +239,7 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         return figures, [*texts, *diagnosis_text(diagnosis)]
 
     def chart(self, part: CentrifugePart, points: pd.DataFrame) -> Chart:
-        """Departure from the straight line over the acceleration, with the polynomial; each radius has a line of its own."""
+        """Departure from the straight line over the acceleration, with the polynomial; each radius has its line."""
         if part.radii_m:
             traces = of_radii(points, 1e-6 * part.radius_um)
         else:

@@ -23,7 +23,7 @@ class Leg:
 
 
 def leg_step(name: str, leg: Leg, soak: int) -> ProcedureStep:
-    """The record of a leg, a soak of its own: the chamber follows the unit, and nothing settles before it."""
+    """The record of a leg, which counts as a separate soak: the chamber follows the unit, and nothing settles before it."""
     setting = {
         "humidity_pct": leg.humidity_pct or 0.0, "pressure_hPa": leg.pressure_hPa,
         "change_s": leg.change_s, "hold_s": leg.hold_s,

@@ -71,7 +71,7 @@ class JudgedCurve:
     high_hz: float = float("nan")
 
     def rows(self) -> list[dict[str, Any]]:
-        """The rows of the table ``procedure_curves``: the lower triangle of the covariance, or one row without it."""
+        """The rows of the table ``procedure_curves``: the lower triangle of the covariance, or a single row without it."""
         about = {"axis": self.axis, "model": self.model, "verdict": self.verdict, "reason": self.reason,
                  "p_value": self.p_value, "low_hz": self.low_hz, "high_hz": self.high_hz}  # fmt: skip
         if not self.names:

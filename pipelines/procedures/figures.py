@@ -22,7 +22,7 @@ REACH_95 = float(normal_upper(TAIL))
 class FigureSpec:
     """A figure that limits may name: its key, unit, and meaning in one line.
 
-    one_axis : the figure is that of a single axis, so that a limit may be a least value; of others the largest axis is kept
+    one_axis : the figure is that of a single axis, so that a limit may be a least value; of others the largest axis is stated
     """
 
     name: str
@@ -97,7 +97,7 @@ class Outcome:
 
 
 def worst(values: Sequence[FigureValue]) -> FigureValue:
-    """The deciding axis: one that is not identified, or no number, else the largest magnitude with twice its uncertainty.
+    """The deciding axis: an axis that is not identified or no number, else the largest magnitude plus twice its uncertainty.
 
     Its interval is that of the largest magnitude of all axes; see :func:`interval_of_largest`.
     """
@@ -158,7 +158,7 @@ SMALLEST_FIXED, LARGEST_FIXED = 1e-5, 1e8  # of U in fixed notation
 
 
 def with_uncertainty(value: float, expanded: float) -> str:
-    """``value ± U``, U to two digits and the value to the same place (GUM 7.2.6)."""
+    """``value ± U``, U to two digits and the value to the same decimal (GUM 7.2.6)."""
     if not math.isfinite(expanded) or expanded <= 0.0:
         return f"{value:.4g}".replace("-", MINUS)
     if not SMALLEST_FIXED <= expanded < LARGEST_FIXED:
@@ -212,7 +212,7 @@ def diagnosis_texts(
 
 
 def signed(value: float, places: int) -> str:
-    """A difference with its sign to some places; what rounds to zero has none."""
+    """A difference with its sign to some decimals; a difference that rounds to zero has no sign."""
     shown = round(value, places)
     text = f"{shown:+.{places}f}" if shown else f"{0.0:.{places}f}"
     return text.replace("-", MINUS)

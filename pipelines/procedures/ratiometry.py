@@ -193,7 +193,7 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
 
 
 def _times_between(rows: pd.DataFrame) -> tuple[float, float]:
-    """Mean times between the two faces of a voltage, and between a voltage and the first one, s; 0 where none are known."""
+    """Mean times between the two faces of a voltage, and between a voltage and the first voltage, s; 0 where none are known."""
     if "time_s" not in rows:  # points of earlier versions have none
         return 0.0, 0.0
     by_voltage = rows.groupby("setting", sort=False)["time_s"]

@@ -134,7 +134,7 @@ END = 1e-4
 
 @dataclass(frozen=True)
 class Device:
-    """The units before the procedure: nominal scale from the full scale, and their calibration if there is one.
+    """The units before the procedure: nominal scale from the full scale, and their calibration if they have been calibrated.
 
     scale : (3,) output per g of each axis, by unit; full_scale, out_unit : of the lot
     scale_error : (3,) standard uncertainty of the scale as a share
@@ -186,7 +186,7 @@ def numbers(rows: pd.DataFrame, *names: str) -> list[Array]:
 
 
 def point_rows(**columns: Any) -> list[dict[str, Any]]:
-    """Rows of points from columns in their order; what is one value, not a sequence, is that of every row."""
+    """Rows of points from columns in their order; a scalar is repeated in every row."""
     count = max(np.size(column) for column in columns.values())
     spread = {name: [column] * count if np.ndim(column) == 0 else column for name, column in columns.items()}
     return [dict(zip(spread, row, strict=True)) for row in zip(*spread.values(), strict=True)]

@@ -70,7 +70,7 @@ class Rotation(InG, Evaluated):
         made: list[ProcedureStep] = []
         for plane in part.planes:
             axis, other = AT_REST[plane]
-            # of the two ends this is the one from which the outer axis has less way between planes
+            # from this end of the turn the outer axis has less way between planes
             end = part.end_deg if axis == "inner" else -part.end_deg
             turns = tuple(
                 Turn(axis, to, rate, part.stand_s)
@@ -86,7 +86,7 @@ class Rotation(InG, Evaluated):
         return made
 
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a table that cannot turn so far or so fast, and one whose encoder's delay is not stated."""
+        """Refuse a table that cannot turn so far or so fast, and a table whose encoder delay is not stated."""
         super().check(part, recipe, station)
         for axis in sorted({AT_REST[plane][0] for plane in part.planes}):
             profile, limits = profile_of(getattr(station.devices, axis)), station.limits
@@ -168,7 +168,7 @@ class Rotation(InG, Evaluated):
         return figures, [*_coefficients(fit, letters), *_drive(part, rows), *_open(part), *_diagnosis(diagnosis)]
 
     def chart(self, part: RotationPart, points: pd.DataFrame) -> Chart | None:
-        """What bias, scale, misalignment, delay and place leave over the angle of each plane, with the effects' curve."""
+        """Residual after bias, scale, misalignment, delay and position, over the angle of each plane, with the effects' curve."""
         if points.groupby("axis")["value"].nunique(dropna=True).min() < len(points) / 10:
             return None  # constant or clipped
         data = data_of(points)
@@ -213,7 +213,7 @@ def _effect(figure: str, effect: str, fit: RotationFit, axis: str) -> FigureValu
 
 
 def _felt(fit: RotationFit) -> list[str]:
-    """Directions in which the test shows the place of the proof masses, not only what is possible."""
+    """Directions in which the test determines the position of the proof masses better than their stated range."""
     return [a for a in "xyz" if fit.of(f"place_{a}")[1] < 0.5 * PLACE_M]
 
 

@@ -97,7 +97,7 @@ def ratio_figures(part: Any, ratio: pd.DataFrame, good: pd.DataFrame, apart: str
 
 
 def _without(ratio: pd.DataFrame, good: int) -> str:
-    """Why there is no comparison; empty where every shock has one."""
+    """Why there is no comparison; empty where every shock was compared."""
     if ratio.empty:
         return "0 of 0 shocks show no pulse; check cable and mounting"
     clipped = int((ratio["clipped"] > 0.0).sum())

@@ -86,9 +86,9 @@ def until(record: UnitRecord, end_s: float) -> UnitRecord:
 def single_pulse(
     number: int, drive: UnitRecord, axis: int, duration: float
 ) -> tuple[float, bool, list[dict[str, Any]]]:
-    """Time before the pulse behind the largest, s, whether one is before the largest, and the rows of both.
+    """Time before the pulse behind the largest, s, whether a pulse is before the largest, and the rows of both.
 
-    A rebound behind the pulse is left out; one before it lies in the baseline of its figures.
+    A rebound behind the pulse is left out; a pulse before it lies in the baseline of its figures.
     """
     earlier, later = pulse_faults.other_pulses(drive.output[:, axis], drive.rate_hz, duration)
     rows = [
@@ -126,7 +126,7 @@ _last_judged: dict[bytes, ShockDiagnosis] = {}
 
 
 def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
-    """The diagnosis of the first shock in each direction; None where no waveforms are kept."""
+    """The diagnosis of the first shock in each direction; None where the points have no waveforms."""
     waveforms = rows[rows["series"] == "compared"]
     shocks: list[Waves] = []
     duration = 1e-3 * part.duration_ms
@@ -148,7 +148,7 @@ def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
 
 
 def judged_curves(rows: pd.DataFrame, part: Any) -> list[JudgedCurve]:
-    """The model of the waveforms with its verdict, which a certificate rests on; none where no waveforms are kept."""
+    """The model of the waveforms with its verdict, which a certificate rests on; none where the points have no waveforms."""
     try:
         diagnosis = judged(rows, part)
     except NotIdentified as problem:

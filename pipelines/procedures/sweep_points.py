@@ -174,7 +174,7 @@ def response_bands(
 ) -> list[dict[str, Any]]:
     """The points of a record of a swept sine, random vibration or an impact: bands of its whole spectrum.
 
-    A record of constant output, or one that is clipped, gives one point without a value.
+    A record whose output is constant or clipped gives a single point without a value.
 
     Parameters
     ----------

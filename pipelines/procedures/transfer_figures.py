@@ -43,7 +43,7 @@ def figures_of_transfer(
     Parameters
     ----------
     part : of the recipe: axis, flat_to_hz, nominal_scale, reference_percent
-    static : (3,), scale of the multi-position test, output per g; None without one
+    static : (3,), scale of the multi-position test, output per g; None without that test
     """
     model = figures_of_model(part.axis, diagnosis, points, "sweep")
     return [*model, _flatness(part, points), _sensitivity(part, diagnosis.extended, static)]

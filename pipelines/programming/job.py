@@ -133,7 +133,7 @@ def _measured_at(run: Run) -> str:
 def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None:
     """The calibration of this run that a unit has today, or had until a programming that was not completed.
 
-    The last one of the run decides: one before it, which an earlier writing ended, does not come back where the last was ended
+    The last calibration of the run decides: an earlier one, which a writing ended, does not come back where the last was ended
     for another reason.
     """
     of_run = [

@@ -87,7 +87,7 @@ class Programmer:
         return outcomes
 
     def _all_failed(self, outcomes: Sequence[ProgrammingOutcome], step: str, problem: BaseException) -> None:
-        """Records every unit whose programming has begun as failed; one that cannot be recorded does not hide the others.
+        """Records every unit whose programming has begun as failed; a failing record does not hide the others.
 
         A beginning without an end counts as failed as well, so a missing record leaves no unit certified.
         """

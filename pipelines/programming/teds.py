@@ -67,7 +67,7 @@ def program_teds(
 
     Coefficients and certificates stay as they are: the pages state the certificate's sensitivity, they do not apply it.
     """
-    pages = {unit.unit: pages_of(unit, run.id, sheet) for _, unit in units}  # all are refused before one is written
+    pages = {unit.unit: pages_of(unit, run.id, sheet) for _, unit in units}  # all are refused before any is written
     with open_lot(run, config) as (station, saved):
         slots = station.reader.slots
         outcomes = [TedsOutcome(unit.unit, slot, pages[unit.unit], slots[slot].teds()) for slot, unit in units]

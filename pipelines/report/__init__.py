@@ -60,7 +60,7 @@ def renew_report(run: Run) -> None:
 
 
 def _captured(run: Run) -> bool:
-    """Whether a run was measured on a station, or is one of a lot that was, not imported."""
+    """Whether the units of a run were measured on a station, not imported."""
     return bool(run.about.get("capture") or run.about.get("parents"))
 
 

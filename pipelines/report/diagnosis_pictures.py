@@ -139,14 +139,14 @@ def quantity_chart(
     colour: Literal["axis", "direction", "slot"] = "axis",
     names: tuple[str, str] = ("before", "after"),
 ) -> Chart:
-    """Residuals of a lot against a recorded quantity; the previous model on the left if there is one, on one scale.
+    """Residuals of a lot against a recorded quantity; the previous model, if any, on the left, on one scale.
 
     Parameters
     ----------
     before : residuals of the previous model, as in the table
-    unit : place of the unit that stands out
+    unit : index of the unit that stands out
     colour : what colours tell of the points of that unit: the axis, or the way the temperature was reached
-    names : of the previous model and of this one
+    names : of the previous model and of this model
     """
     label, values = table.drivers[quantity]
     sides = (
@@ -195,7 +195,7 @@ def _standing_out(table: ResidualTable, residual: Array, along: Array, unit: int
 
 
 def slot_chart(table: ResidualTable) -> Chart | None:
-    """Mean residual of every unit by slot, axis by axis: the influence of the place on the fixture; None without slots."""
+    """Mean residual of every unit by slot, axis by axis: the influence of the slot; None without slots."""
     if "slot" not in table.drivers:
         return None
     slot = table.drivers["slot"][1][:, 0]

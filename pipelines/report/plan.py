@@ -67,7 +67,7 @@ def _budget(reach: dict[str, Any] | None) -> str:
         "bias_error_period": "error over the period",
         "verification_norm": "error in a verification pose, with noise",
     }
-    worst.pop(LARGEST_ERROR, None)  # made of the same contributions
+    worst.pop(LARGEST_ERROR, None)  # it has the contributions of its parts
     return shares_plot(
         {f"{titles.get(q, q)}, {axis_word(row['axis'])}": row["shares"] for q, row in worst.items() if row["shares"]}
     )
@@ -158,7 +158,7 @@ def alias_chart(context: PlanContext) -> Chart | None:
 
 
 def _grouped(cosines: Array) -> list[int]:
-    """Order of rows in which each follows the one it is most confounded with."""
+    """Order of rows in which each follows the effect that it is most confounded with."""
     like = np.maximum(cosines, cosines.T)
     left = set(range(len(like)))
     order = [0]

@@ -45,7 +45,7 @@ class ResidualTable:
         return f"{self.units[unit]}:{int(self.dwells[dwell])}"
 
     def index_of(self, unit: str) -> int:
-        """Place of a unit; that of the one with the largest residuals for a name that is not in the table."""
+        """Index of a unit; that of the unit with the largest residuals for a name that is not in the table."""
         if unit in self.units:
             return self.units.index(unit)
         return int(np.nanargmax(np.nanmean(self.residual**2, axis=(1, 2))))

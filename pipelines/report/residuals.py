@@ -31,7 +31,7 @@ class LotResiduals:
     """Residuals of a lot in µg, (units, axes, n); NaN where a dwell is missing.
 
     axes : "x", "y", "z", or "norm" alone
-    shown : place of the unit whose residuals fall most, or are largest if nothing was added
+    shown : index of the unit whose residuals fall most, or are largest if nothing was added
     """
 
     units: tuple[str, ...]
@@ -54,7 +54,7 @@ class LotResiduals:
 
 @dataclass(frozen=True)
 class DriverValues:
-    """A driver's values (units, n), or (units, n, 3) where it is one per axis, with a label for people.
+    """A driver's values (units, n), or (units, n, 3) where each axis has values, with a label for people.
 
     period : of a swing that the residual follows, in the unit of the values; None of another curve
     """
@@ -109,7 +109,7 @@ def recorded_quantities(problem: Problem) -> list[DriverValues]:
 
 
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
-    """Drivers with a picture: those of the added effects, those that the residual follows, then the usual ones if they vary."""
+    """Drivers with a picture: those of the added effects, those that the residual follows, then usual drivers if they vary."""
     known = {quantity.name: quantity for quantity in recorded_quantities(diagnosis.problem)}
     forces, named = quantities_of_added(diagnosis)
     unknown = diagnosis.unexplained
@@ -131,7 +131,7 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
 def quantities_of_added(diagnosis: Diagnosis) -> tuple[list[DriverValues], list[str]]:
     """The force, or the angles of the table, where an added effect depends on them; and names of its other quantities.
 
-    An effect of a device is seen over the force along its axis, one of the station over the angles.
+    An effect of a device is seen over the force along its axis, an effect of the station over the angles.
     """
     problem = diagnosis.problem
     state = problem.lot.state

@@ -21,11 +21,11 @@ def smooth(name: str, x: Array, y: Array, role: Role, period: float | None = Non
 
 
 def band(x: Array, y: Array, period: float | None = None) -> tuple[Array, Array, Array]:
-    """Smooth curve through points with its 95 % band: (places, low, high); empty where there are too few.
+    """Smooth curve through points with its 95 % band: (abscissas, low, high); empty where there are too few.
 
     Parameters
     ----------
-    period : of a swing that the points follow, in the unit of x; then the curve is one
+    period : of a swing that the points follow, in the unit of x; then the curve is such a swing
     """
     there = np.isfinite(x) & np.isfinite(y)
     x, y = x[there], y[there]

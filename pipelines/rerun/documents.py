@@ -51,7 +51,7 @@ class FigureDifference(ValueDifference):
 
 
 class CauseOfDifference(TypedDict):
-    """What is not the same in two runs."""
+    """What differs between two runs."""
 
     what: Annotated[str, "data, code, model, limits or library"]
     stage: NotRequired[str]

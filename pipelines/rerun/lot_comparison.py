@@ -52,7 +52,7 @@ class Side:
 class LotComparison:
     """A lot under the old and the new model.
 
-    sides : the old and the new one; none where the lot could not be judged
+    sides : under the old and the new model; none where the lot could not be judged
     """
 
     entry: SelectedRun

@@ -28,7 +28,7 @@ class Batch:
 def parts(
     archive: Archive, runs: Sequence[str], change: ModelChange, workers: int, *, report: bool = False
 ) -> list[Batch]:
-    """The runs in batches, several for each worker; the same runs give the same batches."""
+    """The runs in batches, several for each worker; equal runs give equal batches."""
     size = min(MOST, max(1, -(-len(runs) // (4 * max(workers, 1)))))
     batches = [tuple(runs[start : start + size]) for start in range(0, len(runs), size)]
     return [Batch(archive.address, batch, change, report) for batch in batches]

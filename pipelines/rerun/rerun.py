@@ -1,4 +1,4 @@
-"""One run of the archive again: only the stages whose key changed, into a new run; the old one stays as it is."""
+"""One run of the archive again: only the stages whose key changed, into a new run; the old run is not changed."""
 
 import time
 from dataclasses import dataclass, field
@@ -40,7 +40,7 @@ class RerunOutcome:
 def again(
     archive: Archive, run_id: str, change: ModelChange, *, report: bool = False, left_out: Dwells = ()
 ) -> RerunOutcome:
-    """Run an archived run again. A new run is published when all of it is there: one that fails or is stopped leaves nothing.
+    """Run an archived run again. A new run is published when all of it is there: a run that fails or is stopped leaves nothing.
 
     Raises DataRejected: the run cannot be run again: its capture is not finished, or samples are needed that are not in the
         archive.
@@ -66,7 +66,7 @@ def again(
             stages = _done(old, new, plan, raw=raw)
             with alone(new.path, wait=True):
                 files.sweep(new.path)
-                if (new.path / START).is_file():  # another process did the same meanwhile, with the same bytes
+                if (new.path / START).is_file():  # another process made this run meanwhile, with the same bytes
                     new.forget()
                 new.flush(last=START)
         with alone(new.path, wait=True):
@@ -115,7 +115,7 @@ def has_static_record(run: Run) -> bool:
 def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
     """What a re-run would do otherwise than the run did: by stage, ``code``, ``model``, ``limits`` or another parameter.
 
-    raw : whether the raw samples are there; without them the stages that read them are kept as they are
+    raw : whether the raw samples are there; without them the tables of the stages that read them are reused
     """
     rows: list[dict[str, str]] = []
     there = set(old.tables())

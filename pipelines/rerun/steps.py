@@ -64,7 +64,7 @@ class ArchivedJob(Job):
 
     @property
     def about(self) -> dict[str, Any]:
-        """What is kept beside the run for readers."""
+        """The content of ``run.json`` that describes the run to readers."""
         decided = {"recipe": self.recipe.model_dump(mode="json"), "limits": self.limits.model_dump(mode="json")}
         return {**self.run_document, **decided, "lot": self.lot.model_dump(mode="json")}
 
@@ -72,7 +72,7 @@ class ArchivedJob(Job):
 def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
     """The job of a captured run, with another model or other limits where they are given."""
     about, keys = run.about, model_keys(change)
-    if keys:  # the prior of another model is none of this one
+    if keys:  # the prior of another model does not fit this model
         about["recipe"]["prior"] = None
         about.pop("prior", None)
     try:
@@ -107,7 +107,7 @@ FROM_SAMPLES = (
     "validate",
     "reduce",
     "soak_noise",
-)  # stages whose tables are kept where the raw samples are no longer there
+)  # stages whose tables are reused where the raw samples are no longer there
 RAW = (*FROM_SAMPLES, "noise")  # stages that read the raw samples
 
 
@@ -115,7 +115,7 @@ RAW = (*FROM_SAMPLES, "noise")  # stages that read the raw samples
 class Plan:
     """All that is to be done to a run.
 
-    name : begins the new run's name; about : what it is kept with; decisive : what its result depends on
+    name : begins the new run's name; about : the content of its ``run.json``; decisive : what its result depends on
     """
 
     name: str
@@ -207,7 +207,7 @@ def _import_plan(
     more: dict[str, Any],
     depends: dict[str, Any],
 ) -> Plan:
-    """The plan of an import: what it is kept with, and what its result depends on, have the dwells that are left out."""
+    """The plan of an import; its ``run.json`` and its key state the dwells that are left out."""
     about = run.about
     named = [f"{unit}:{dwell}" for unit, dwell in left_out]
     noted = {"left_out": [*about.get("left_out", []), *named]} if left_out else {}

@@ -67,7 +67,7 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange
         earlier: dict[str, list[str]] = defaultdict(list)
         capture = judged.entry.capture
         for unit in judged.sides[1].fitted:
-            # the dwells of a run are not fresh for another one of the same capture
+            # the dwells of a run are not fresh for another run of the same capture
             if unit in last and not (capture and last[unit].entry.capture == capture):
                 earlier[last[unit].entry.id].append(unit)
             last[unit] = judged

@@ -114,7 +114,7 @@ def told_sentences(end: EarlyEnd) -> list[str]:
 def early_end_sentence(end: EarlyEnd, unit: str = "") -> str:
     """The early end in words, for summary, report and certificate; empty where the plan was measured as it stands.
 
-    unit : the one whose uncertainties are spoken of; all where empty
+    unit : whose uncertainties are worded; all units where empty
     """
     lengths = dwell_words(end)
     chosen = f"dwells of {lengths} s by the noise of the run" if len(set(end["dwell_s"])) > 1 else ""

@@ -34,7 +34,7 @@ def planned_state(
     Quantities that the plan does not set (supply, vibration, what the station's reader records besides) wander a little, as they
     do on a station, so that effects of theirs are not refused.
 
-    station : the built-in simulated one where None
+    station : the built-in simulated station where None
     history : whether the temperatures between the dwells go along, as a station records them
     recorded : columns that are recorded besides; those of the station's reader where None
     """

@@ -54,7 +54,7 @@ class Step:
 def steps(recipe: Recipe) -> list[Step]:
     """Every record of a recipe in order: of its procedures, or without a list of the multi-position test and the static record.
 
-    A procedure at the temperature of the one before shares its soak.
+    A procedure at the temperature of the procedure before shares its soak.
     """
     listed: list[tuple[str, Part | None]] = [(part.kind, part) for part in parts_of(recipe)]
     if not listed:

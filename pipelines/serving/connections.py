@@ -1,7 +1,7 @@
 """The sockets of servers and their connections: at most so many, in all and of one address, and none that says nothing for long.
 
 They are counted where they are accepted, so that those within the handshake of TLS and WebSockets count too. An idle connection
-has no request in progress. Where there are too many, the oldest idle one is closed, so that idle ones shut nobody out; then the
+has no request in progress. Where there are too many, the oldest idle connection is closed, and none shuts others out; then the
 oldest long answer (a browser connects to a stream of events again by itself); a new connection is refused where there is neither.
 """
 
@@ -152,7 +152,7 @@ class Connections:
         return None if client is None else self.open.get((client[0], client[1]))
 
     def _end_one(self, there: list[Connection]) -> bool:
-        """End the oldest idle connection, else the one with the oldest long answer; whether there was one."""
+        """End the oldest idle connection, else that with the oldest long answer; return whether any was ended."""
         long_before = time.monotonic() - self.limits.long_s
         idle = [connection for connection in there if not connection.requests and not connection.unsent]
         long = [

@@ -45,7 +45,7 @@ class Statistic:
         integral if ``integral``
     parts : shortest record, in averaging times
     freedom : degrees of freedom of the variance at α, m and n; None: the statistic has no interval
-    bias : expectation of the variance over the one that it estimates, at α and m/n
+    bias : expectation of the variance over the Allan variance that it estimates, at α and m/n
     sees_ramp : whether a ramp of the output is part of the deviation
     """
 

@@ -38,7 +38,7 @@ def fit(
     (method ``wander``); where there are too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: Birge
     ratio squared). The table ``wander`` says which; ``prior`` what the family of the devices adds. Tables without rows come back
     where no unit was accepted. Units that lack dwells which others have are fitted on theirs: with the noise of the units that
-    have the same ones, or, where the model has values that all units share, in one fit of the lot.
+    have the same dwells, or, where the model has values that all units share, in one fit of the lot.
 
     Parameters
     ----------

@@ -214,7 +214,7 @@ def _badness(figure: Value, guard: float, *, least: bool) -> float:
 
 
 def _coefficients(evidence: GradeEvidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:
-    """The coefficients of the lot and the place of each unit in them; None where no unit was calibrated."""
+    """The coefficients of the lot and the index of each unit in them; None where no unit was calibrated."""
     if evidence.coefficients.empty:
         return None, {}
     calibration = evidence.calibration or read_calibration(evidence.coefficients, evidence.covariance)
@@ -299,5 +299,5 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
 
 
 def has_least(limits: Limits) -> bool:
-    """Whether a limit is a least value: such figures stand in a column of their own, since ``limit`` is of a magnitude."""
+    """Whether a limit is a least value: such figures have a separate column, since ``limit`` is of a magnitude."""
     return any(figure.min is not None for figure in limits.figures.values())

@@ -86,7 +86,7 @@ def _answered(readings: pd.DataFrame, record: int, accepted: list[str]) -> pd.Da
 
 
 def _device(readings: pd.DataFrame, coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Device:
-    """The units with the scale of their calibration, where the recipe has one."""
+    """The units with the scale of their calibration, where the recipe calibrates them."""
     device = nominal_device(readings)
     if coefficients.empty:
         return device

@@ -65,7 +65,7 @@ def rms_uncertainty(error: Array, covariance: Array) -> Array:
 
 
 def _spread_of_root(second: Array, third: Array) -> Array:
-    """Standard deviation of the root of a positive sum of squares of mean one with these second and third cumulants.
+    """Standard deviation of the root of a positive sum of squares of mean 1 with these second and third cumulants.
 
     Of χ²/ν it is 0.603 for one degree of freedom, and 1/√(2ν) for many. χ² is the cube of a normal value (Wilson and Hilferty,
     Proc. Nat. Acad. Sci. 17 (1931) 684).

@@ -87,7 +87,7 @@ def column_names(
 
 @lru_cache(maxsize=64)
 def _all_names(sensor: tuple[SensorEffect, ...], axes: tuple[int, ...]) -> tuple[tuple[tuple[str, str], ...], ...]:
-    """Per axis, all columns that effects may have; the model of many lots is the same."""
+    """Per axis, all columns that effects may have; cached, since many lots share a model."""
     return tuple(design.local_names(sensor, axis) for axis in axes)
 
 
@@ -145,7 +145,7 @@ def _beside(local: NDArray[np.float64], common: Sequence[float]) -> NDArray[np.f
 
 
 def _common_rows(fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]) -> list[_Row]:
-    """Parameters of the station, nonlinear parameters and constants: one for all axes, or one for each axis."""
+    """Parameters of the station, nonlinear parameters and constants: a single value for all axes, or a value for each axis."""
     errors = np.sqrt(np.diagonal(fit.shared_covariance)) if fit.shared.size else np.zeros(0)
     rows = [
         _Row(EVERY_AXIS, effect, name, float(fit.shared[q]), float(errors[q]), "rad")

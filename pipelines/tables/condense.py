@@ -1,4 +1,4 @@
-"""Reduction of long runs: consecutive dwells of one pose are averaged, or every k-th dwell is kept."""
+"""Reduction of long runs: consecutive dwells of one pose are averaged, or only every k-th dwell is used."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def condense(dwells: pd.DataFrame) -> pd.DataFrame:
     grouped = dwells.assign(dwell=dwells["dwell"].map(group_of)).groupby(["unit", "dwell"], as_index=False, sort=True)
     joined = grouped.agg(how)
     for axis in "xyz":
-        # single samples have no scatter of their own: the scatter of the group is used
+        # a single sample has no scatter: the scatter of the group is used
         scatter = joined[f"sd_{axis}"] if f"sd_{axis}" in joined.columns else pd.Series(np.nan, index=joined.index)
         joined[f"sd_{axis}"] = scatter.where(scatter > 0.0, grouped[f"out_{axis}"].std()[f"out_{axis}"])
     if "n" not in joined.columns:
         joined["n"] = grouped.size()["size"]
-    full = grouped.size()["size"] >= 0.5 * size  # the remainder of a stretch is too short for a dwell of its own
+    full = grouped.size()["size"] >= 0.5 * size  # the remainder of a stretch is too short for a dwell
     return joined[full].dropna(subset=["sd_x", "sd_y", "sd_z"])
 
 

@@ -102,7 +102,7 @@ class LotTables:
 
     @cached_property
     def parts(self) -> tuple[LotTables, ...]:
-        """The lot in parts whose units have the same dwells: itself where no unit lacks one that another has."""
+        """The lot in parts whose units have the same dwells: the whole lot where no unit lacks a dwell that another has."""
         sets = dwells_of_units(self.dwells)
         if len(set(sets.values())) <= 1:
             return (self,)

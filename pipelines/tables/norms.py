@@ -126,7 +126,7 @@ def _refuse_quiet(output: Array) -> None:
 
 
 def _far(readings: Readings, unit: int, fit: EllipsoidFit, used: NDArray[np.bool_], *, warm: bool) -> NDArray[np.bool_]:
-    """The dwell that is farthest off among those kept, if it is far beyond the scatter of the others."""
+    """Flags (n,) of the used dwell that is farthest from the ellipsoid, if it is far beyond the scatter of the others."""
     heat = _heat(readings, unit, readings.there[unit]) if warm else None
     left = np.zeros(used.size)
     there = readings.there[unit]
@@ -150,7 +150,7 @@ def _fitted(readings: Readings, unit: int, used: NDArray[np.bool_], shape: Shape
 
 
 def _heat(readings: Readings, unit: int, there: NDArray[np.bool_]) -> Array | None:
-    """Temperatures of a unit's dwells; None where there are none, or one of them is missing."""
+    """Temperatures of a unit's dwells; None where none are recorded, or one is missing."""
     temperature = readings.temperature if readings.temperature is not None else readings.chamber
     if temperature is None or not np.all(np.isfinite(temperature[unit, there])):
         return None

@@ -35,7 +35,7 @@ def generator() -> np.random.Generator:
 def sound_lot(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], left_out: Collection[str] = ()
 ) -> tuple[Measured, list[Fault], Lot | None]:
-    """Readings, data faults, and the lot of the units without a fault, g; no lot where every unit has one.
+    """Readings, data faults, and the lot of the units without a fault, g; no lot where every unit has a fault.
 
     Parameters
     ----------

@@ -138,7 +138,7 @@ class Outlier(NamedTuple):
 
 
 def first_outlier(output: Array, lsb: float, full_scale: float) -> Outlier | None:
-    """The first sample that lies too far from the median of the samples (n, 3) of one record; None without one, or for a small n.
+    """The first sample too far from the median of the samples (n, 3) of one record; None where none is, or for a small n.
 
     The spread is half the width of the middle 68 %, which no outlier widens. It takes all samples at once: percentiles of several
     tables do not follow from those of each, so it is no column of :func:`summarised`.

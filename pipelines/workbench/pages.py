@@ -37,7 +37,7 @@ State = TypeVar("State", bound="PageState")
 
 
 def _written(body: dict[str, Any]) -> dict[str, Any]:
-    """The body, whose texts are ones that files can have as names and answers can quote."""
+    """The body of a request, whose texts may be file names and may be quoted in answers."""
     for key, value in body.items():
         for text in (key, value):
             if isinstance(text, str) and any(letter == "\0" or "\ud800" <= letter <= "\udfff" for letter in text):
@@ -188,7 +188,7 @@ def table_csv(rows: Sequence[Mapping[str, Any]], name: str) -> Response:
 
 
 def run_table(bench: Workbench, run: str, name: str) -> pd.DataFrame:
-    """A table of a run, cached while its manifest is the same."""
+    """A table of a run, cached while its manifest does not change."""
     stored = bench.archive.run(run)
     path = stored.path / f"{name}.json"
     when = path.stat().st_mtime_ns if isinstance(path, Path) and path.is_file() else 0

@@ -122,7 +122,7 @@ def _refused_to_read(scope: Scope, headers: Headers, settings: WorkbenchSettings
 
 
 def _local(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> bool:
-    """Whether the request is one of this machine; by HTTP/1.0, which no browser uses, some proxies ask without a header."""
+    """Whether the request came from this machine; by HTTP/1.0, which no browser uses, some proxies ask without a header."""
     return (
         settings.local
         and not settings.proxied

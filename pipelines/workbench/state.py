@@ -40,7 +40,7 @@ def like(text: str) -> str:
 
 
 def options(values: Mapping[str, str]) -> list[str]:
-    """Options of a command line with their values; those without one are omitted."""
+    """Options of a command line with their values; options without a value are omitted."""
     return [word for name, value in values.items() if value for word in (name, value)]
 
 

@@ -122,7 +122,7 @@ def _settings(device: Device, *, search_line: bool) -> Iterator[Device]:
 
 
 def _at(link: GatedLink, profile: Profile, device_id: int) -> Answer | None:
-    """What answers at one id: at the addresses of the profile, else one beside them or in the other space; None for silence."""
+    """What answers at an id: at the addresses of the profile, else shifted by one or in the other space; None for silence."""
     stated = _read(link, profile, device_id, probes(profile))
     if stated is None:
         return None
@@ -167,7 +167,7 @@ def _read(link: GatedLink, profile: Profile, device_id: int, registers: Sequence
 
 
 def _best(target: Target, answers: Iterable[Answer], given_id: int) -> Answer:
-    """The one answer that is of the profile; several equally good ones are for the person to decide."""
+    """The answer that is of the profile; between several equally good answers the person decides."""
     ranked = sorted(answers, key=lambda answer: -answer.score)
     best = ranked[0]
     alike = [answer.device_id for answer in ranked if answer.score == best.score]

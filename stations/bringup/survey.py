@@ -40,7 +40,7 @@ class Survey:
 
 
 def survey(target: Target, findings: Findings, person: Person) -> Survey:
-    """Reads every register or command of the profile, each in a request of its own."""
+    """Reads every register or command of the profile, each in a separate request."""
     found, values = Survey(), target.values()
     for entry in (*target.profile.registers, *target.profile.commands):
         if isinstance(entry, Register) and entry.access == "write":
@@ -60,7 +60,7 @@ def survey(target: Target, findings: Findings, person: Person) -> Survey:
 
 
 def _read(target: Target, values: Values, entry: Register | Command, found: Survey, findings: Findings) -> Values:
-    """Reads one value; the values on a new connection where the old one was lost."""
+    """Reads one value; the values on a new connection where the old connection was lost."""
     name = entry.name
     begun = time.monotonic()
     try:

@@ -1,4 +1,4 @@
-"""The links of a station, made from its file: the only place that makes any, and behind each the gate for writes."""
+"""The links of a station, made from its file: they are made here alone, and behind each is the gate for writes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ Behind = dict[int, tuple[str, Profile]]  # name and profile of every device behi
 
 
 class WireSource(Protocol):
-    """Wires in place of those to devices, such as those of a replayed recording."""
+    """Wires instead of those to devices, such as those of a replayed recording."""
 
     def wire(self, link: str, where: str) -> Wire:
         """The Modbus wire of a link, which has the name of its first device; ``where`` is its address in messages."""
@@ -39,7 +39,7 @@ class Links:
     """Links by address, each made once; a simulated station's are ``simulated_at``, by what carries them.
 
     ``permit`` is what the gates ask before anything is sent; None where nothing is driven, or where no other process can drive.
-    ``recorder`` records every exchange; ``instead`` gives wires in place of those to devices.
+    ``recorder`` records every exchange; ``instead`` gives wires instead of those to devices.
     """
 
     config: StationConfig
@@ -123,7 +123,7 @@ class Links:
         return ("rtu", device.serial, 0) if device.link == "rtu" else (device.link, device.host, device.port)
 
     def _behind(self, key: Key) -> Behind:
-        """The devices behind one address; the first one names the link."""
+        """The devices behind an address; the first of them names the link."""
         behind: Behind = {}
         for name in Devices.model_fields:
             device = getattr(self.config.devices, name)
@@ -152,7 +152,7 @@ def _where(key: Key) -> str:
 def _gated_link(
     wire: Wire, behind: Behind, recorder: FrameRecorder | None, attempts: int, permit: Permit | None
 ) -> GatedLink:
-    """The gate before a wire with these devices behind it; in a recording it has the name of the first one."""
+    """The gate before a wire with these devices behind it; in a recording it has the name of the first device."""
     if recorder is not None:
         name = next(iter(behind.values()))[0]
         for device_id, (device, profile) in behind.items():

@@ -61,7 +61,7 @@ def stream(*key: int | str) -> np.random.Generator:
 def draw_truth(
     preset: Preset, serial: str, seed: int, *, slot_rotation: Array, supply_ratio: float, output_scale: float
 ) -> Truth:
-    """A unit's truth, the same for the same serial and seed on every station."""
+    """A unit's truth, determined by serial and seed alone, whatever the station."""
     rng = stream(seed, serial, "truth")
     normal = rng.standard_normal((8, 3))
     skew = np.eye(3) + 1e-3 * preset.misalignment_sd_mrad * rng.standard_normal((3, 3)) * (1.0 - np.eye(3))

@@ -87,7 +87,7 @@ class DynamicTruth:
 
 @dataclass(frozen=True)
 class Rig:
-    """What the equipment really is: its own errors, the same for all runs of a station."""
+    """What the equipment really is: its errors, which all runs of a station share."""
 
     reference_error: float
     distortion: float

@@ -97,7 +97,7 @@ PERIODS_S = (1500.0, 4100.0, 11000.0)  # air conditioning, doors, weather
 
 
 class Fixture:
-    """Slots, each with its thermal lag and its place in the air stream. Steps are computed one ahead of the clock.
+    """Slots, each with its thermal lag and its position in the air stream. Steps are computed one ahead of the clock.
 
     A command in the middle of a second acts from the next whole second on, so that the result does not depend on the division of
     the time before it into steps.

@@ -118,7 +118,7 @@ def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], blo
 class _Handler(ServerRequestHandler):
     """A connection whose requests are tasks of the server's own loop.
 
-    pymodbus hands each one over as if it came from another thread, which wakes the loop three more times for a request.
+    pymodbus hands each request over as if it came from another thread, which wakes the loop three more times for a request.
     """
 
     def handle_later(self) -> None:

@@ -167,7 +167,7 @@ class Axis:
         return round(angle / ENCODER_STEP_DEG) * ENCODER_STEP_DEG
 
     def _age(self, now: float) -> float:
-        """Age of a reading, s; one that stands still shows the same at any age."""
+        """Age of a reading, s; the reading of a still axis does not depend on it."""
         latency, jitter = self.late_s
         if jitter == 0.0:
             return latency

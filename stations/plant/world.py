@@ -66,7 +66,7 @@ class World:
         self.preset: Preset = load_preset(lot.device, sim.preset_overrides).with_axes(lot.sensor_axes)
         self.serials = [unit.serial for unit in lot.units]
         self.slots = [unit.slot for unit in lot.units]
-        self.seats = list(range(len(lot.units)))  # index of the unit that really sits in the place of each unit
+        self.seats = list(range(len(lot.units)))  # index of the unit that really sits in each unit's slot
         self._key = int(stream(sim.seed, lot.seed, lot.repeat).integers(2**62))
         self.outer, self.inner = Axis(self._key, OUTER), Axis(self._key, INNER)
         effects = [*hidden, *(hidden_effect(h.kind, h.figures) for h in sim.hidden)]

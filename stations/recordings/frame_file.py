@@ -52,7 +52,7 @@ class Exchange:
 
     @property
     def writes(self) -> bool:
-        """Whether it is an order; a line of text is one where it is no query."""
+        """Whether it is an order; a line of text is an order unless it is a query."""
         return not self.request.endswith(b"?") if self.text else self.request[:1] != b"" and self.request[0] in WRITES
 
     @property

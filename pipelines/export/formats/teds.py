@@ -42,7 +42,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     Raises
     ------
     WrongUse
-        The output is not in V, the data sheet is missing, or a serial number has no digits of its own at its end.
+        The output is not in V, the data sheet is missing, or a serial number does not end in digits that no other unit has.
     """
     sheet = settings.data_sheet or data_sheet("", "")  # which refuses, as no key is given
     files: dict[str, bytes] = {}
@@ -67,7 +67,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
 
 
 def serial_numbers(units: Sequence[str]) -> dict[str, int]:
-    """The digits at the end of each serial number, by unit; two units with the same are refused."""
+    """The digits at the end of each serial number, by unit; two units with equal digits are refused."""
     owners: dict[int, str] = {}
     for unit in units:
         serial = _serial(unit)

@@ -1,4 +1,4 @@
-"""The readers of files: each is one module of this package and is discovered here.
+"""The readers of files: each module of this package is a reader, and is discovered here.
 
 A module states ``NAME`` (of the format in the archive), ``TITLE`` (for people), ``EXTRA`` (the optional dependency that
 it needs, or empty), ``ORDER`` (order in which readers are tried), ``recognised`` and ``read``.

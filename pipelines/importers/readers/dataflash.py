@@ -24,7 +24,7 @@ STATED = {"Acc": "m/s^2", "Gyr": "rad/s", "T": "degC"}
 
 
 def read(name: str, data: bytes, group: str) -> Content:
-    """The fields of one message; one with several instances is a group for each, such as `IMU 0`; `time` in s since power-on."""
+    """The fields of one message; one group for each of its instances, such as `IMU 0`; `time` in s since power-on."""
     reader = library("pymavlink.DFReader", EXTRA, f"{name}: a DataFlash log")
     with tempfile.TemporaryDirectory() as folder:  # the library maps a file
         path = Path(folder) / "log.bin"

@@ -1,4 +1,4 @@
-"""enDAQ and Mide recorders (.ide): the subchannels of one channel, each channel with a clock of its own."""
+"""enDAQ and Mide recorders (.ide): the subchannels of one channel, each channel with a separate clock."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ class _Form:
     at: int = 0
 
     def check(self) -> bool:
-        """Whether it holds numbers, texts, cells and structures only; a variable without the form of one is refused."""
+        """Whether it holds numbers, texts, cells and structures only; a variable of another form is refused."""
         try:
             self._matrix(len(self.data), 0)
         except _OtherClass:

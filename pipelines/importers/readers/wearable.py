@@ -54,7 +54,7 @@ def read(name: str, data: bytes, group: str) -> Content:
             f"{name}: {found['format']}: no samples of acceleration were found, some are needed; "
             "export it as CSV with its maker's program (ActiGraph's packets ACTIVITY2 are not read)"
         )
-    if packed and FROM_PARAMETERS not in found["metadata"]:  # the library would take a rate and a scale of its own
+    if packed and FROM_PARAMETERS not in found["metadata"]:  # the library would assume a rate and a scale
         raise DataRejected(
             f"{name}: {found['format']}: no packet of parameters, which state rate and scale; {REMEDY.partition(', or ')[2]}"
         )

@@ -48,7 +48,7 @@ TEMPLATE = """\
 
 
 def render(report: ReportContext) -> str:
-    """The budget; a notice for runs without one, such as runs of earlier versions."""
+    """The budget; a notice for runs without a budget, such as those of earlier versions."""
     sums, station = report.tables.get("uncertainties", pd.DataFrame()), report.about.get("station") or {}
     recipe = report.recipe
     entries = {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}

@@ -33,7 +33,7 @@ TEMPLATE = """\
 
 
 def render(unit: UnitContext) -> str | None:
-    """Every procedure of the recipe's list that has figures of its own; None for recipes without a list."""
+    """Every procedure of the recipe's list that has figures; None for recipes without a list."""
     parts = unit.report.recipe.get("procedures") or []
     tables = unit.tables
     if not parts or "procedure_figures" not in tables:

@@ -65,7 +65,7 @@ class LotCoefficients:
         self._noise: dict[str, Array] = {}
 
     def of(self, unit: int) -> UnitCoefficients:
-        """The coefficients of the unit at a place of the lot."""
+        """The coefficients of the unit with this index in the lot."""
         return UnitCoefficients(self, unit)
 
     def effect(self, effect: str, unit: int) -> tuple[Array, Array, Array]:
@@ -191,11 +191,11 @@ class FigureKind:
 
     Parameters
     ----------
-    name : key in limits files and tables; ends in the unit where it has one.
+    name : key in limits files and tables; ends in the unit of the figure where there is a unit.
     unit : unit of the value, "1" for a ratio.
     meaning : of the value, a sentence of the reference.
     label : heading in the report.
-    order : place in tables, ascending.
+    order : the figures are listed by it, ascending.
     value : the figure of a unit, None where its tables do not yield one.
     missing : what a recipe lacks to yield the figure, empty where it lacks nothing.
     """

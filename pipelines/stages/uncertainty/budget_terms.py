@@ -27,7 +27,7 @@ MANY = 1e6
 class BudgetTables:
     """The tables that a budget is computed from.
 
-    prior : None for a fit without one
+    prior : None for a fit without a prior
     lot, calibration : dwells with their history, and coefficients, where other stages have converted them already
     results : of comparisons; None where the run has none
     """
@@ -152,7 +152,7 @@ def terms_of(
 
 
 def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
-    """The terms of an archived run, from what is kept beside it; None for runs that state none."""
+    """The terms of an archived run, from its ``run.json``; None for runs without a stated uncertainty."""
     station, recipe = about.get("station") or {}, about.get("recipe") or {}
     stated = merged(
         *(

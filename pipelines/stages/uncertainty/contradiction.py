@@ -58,7 +58,7 @@ def lot_references(tables: BudgetTables, terms: BudgetTerms) -> LotReferences | 
     if len(lot.units) < FEWEST:
         return "one unit alone: errors of the table cannot be separated from its noise; measure two or more together"
     evidence, groups, along = _evidence(lot, tables, terms, terms.stated)
-    first = int(along[0])  # they are the last ones, and taken to be zero
+    first = int(along[0])  # the influences along the force are the last, and taken to be zero
     of_table = CommonEvidence(evidence.information[:first, :first], evidence.projection[:first])
     looked = sizes(of_table, groups)
     found = contradictions(of_table, groups, looked)
@@ -68,7 +68,7 @@ def lot_references(tables: BudgetTables, terms: BudgetTerms) -> LotReferences | 
 def _evidence(
     lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty
 ) -> tuple[CommonEvidence, dict[str, Places], Places]:
-    """The evidence on the common influences, the places of those that are judged, and those along the force (the last ones)."""
+    """The evidence on the common influences, and the indices of the judged influences and of those along the force (the last)."""
     calibration, state = tables.calibrated(), lot.state
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     physical = with_device_temperature(model, calibration.response, terms.stability, calibration.axes)
@@ -97,7 +97,7 @@ def _evidence(
 
 
 def _each_dwell(change: Array, shape: tuple[int, ...]) -> Array:
-    """A change (units, n, 3) as one of each dwell alone, (units, n, 3, n)."""
+    """A change (units, n, 3) as n changes of a single dwell each, (units, n, 3, n)."""
     change = np.broadcast_to(change, shape)
     out = np.zeros((*shape, shape[1]))
     every = np.arange(shape[1])

@@ -38,7 +38,7 @@ class UncertaintySource:
 
 
 def merged(station: Uncertainty | None, recipe: Uncertainty | None) -> Uncertainty | None:
-    """The station's statement with the recipe's entries in place of the same ones; None where neither states any."""
+    """The station's statement, with entries of the recipe replacing those of the same key; None where neither states any."""
     if station is None or recipe is None:
         return station or recipe
     grades = {station.grade_source, recipe.grade_source}

@@ -66,7 +66,7 @@ class _PartBudget:
 
 
 class _UnitBudget(Mapping[Key, BudgetRow]):
-    """The quantities of the unit at a place of its part of the lot."""
+    """The quantities of the unit with this index in its part of the lot."""
 
     def __init__(self, lot: _PartBudget, index: int) -> None:
         self._lot, self._index = lot, index

@@ -87,7 +87,7 @@ def _square(axis: AxisErrors, unit: int, form: Array, z: Array, switched: Array)
 
 
 def _form(axis: AxisErrors, influences: Array) -> Array:
-    """Draws of the square of what the references make, of mean one."""
+    """Draws of the squared error by the references, of mean 1."""
     trace = float(np.trace(axis.form))
     if not trace > 0.0:
         return np.ones(len(influences))
@@ -102,7 +102,7 @@ def _chi_squared(dof: float, z: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def _uniform(count: int) -> Array:
-    """The same well-spread draws every time: a decision that is made again is the same."""
+    """Well-spread draws from a fixed seed, so that a repeated decision is identical."""
     draws = qmc.Sobol(count, scramble=True, rng=np.random.default_rng(20260101)).random(DRAWS)
     return np.clip(draws, 1e-9, 1.0 - 1e-9)
 
@@ -175,7 +175,7 @@ def ageing_u(ageing: Ageing, windows: Windows) -> float:
 
 
 def instability_of(tables: BudgetTables, unit: str, axis: str) -> float:
-    """Bias instability B, µg: of the static record, its upper limit where it is not identified; without one that of the fit."""
+    """Bias instability B, µg: of the static record, its upper limit where it is not identified; of the fit without a record."""
     shown, _ = _of_record(tables.noise, unit, axis, "B")
     return shown if np.isfinite(shown) else _of_fit(tables.wander, unit, axis, "bias_instability_ug")
 

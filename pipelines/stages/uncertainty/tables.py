@@ -120,7 +120,7 @@ def has_uncertainty(row: Mapping[str, Any]) -> bool:
 
 
 def groups_of(variances: VarianceParts) -> dict[str, Places]:
-    """The places among the influences of every contribution, in order."""
+    """Indices of the influences that make up each contribution, in order."""
     names = np.array(variances.fit.source.contributions, dtype=object)
     return {group: np.flatnonzero(names == group) for group in dict.fromkeys(names.tolist())}
 

@@ -145,7 +145,7 @@ def _of_residuals(diagnosed: Diagnosed, table: ResidualTable, state: MissingPage
 
 
 def _quantity(diagnosed: Diagnosed, state: MissingPage) -> str:
-    """The quantity of the address, else that of the missing effect, else the one that the residual follows most, else force."""
+    """The quantity of the address, else that of the missing effect, else that which the residual follows most, else force."""
     known = {} if diagnosed.table is None else diagnosed.table.drivers
     first = "" if diagnosed.table is None else diagnosed.table.first
     followed = [first, *(str(row["driver"]) for row in diagnosed.document["where"])]

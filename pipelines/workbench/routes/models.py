@@ -69,7 +69,7 @@ def _releases(bench: Workbench) -> list[dict[str, Any]]:
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:
-    """Old and new value of a figure in columns of their own."""
+    """Old and new value of a figure in separate columns."""
     out: dict[str, Any] = {}
     for key, value in row.items():
         pair = isinstance(value, (list, tuple)) and len(value) == 2

@@ -95,7 +95,7 @@ REMEDIES = {
 
 @router.get("/operator")
 def operator(request: Request) -> Response:
-    """The newest lot as tiles, or the one of the address; seats to scan if no lot is running."""
+    """The lot of the address as tiles, by default the newest; seats to scan if no lot is running."""
     bench, state, problems = asked(request, OperatorPage)
     newest, known = lots.lots(bench.settings), stations_of(bench.settings)
     chosen = next((lot for lot in newest if lot.id == state.lot), None)

@@ -32,12 +32,12 @@ STEP_DEG = 0.5
 
 
 def dragged_to(settings: WorkbenchSettings, state: PlanPage, name: str, x: float, y: float) -> PlanPage:
-    """The page with a pose at a place of the map; of the two ways to turn there, the one nearer to the pose's present angles.
+    """The page with a pose at a point of the map; of the two ways to turn there, that nearer to the pose's present angles.
 
     Raises
     ------
     WrongUse
-        The place is outside of the sphere.
+        The point is outside of the sphere.
     """
     force = direction_at(x, y)
     if force is None:
@@ -144,7 +144,7 @@ def visibility(request: Request) -> Response:
 
 @router.post("/plan/pose")
 def move(request: Request, body: RequestBody) -> JSONResponse:
-    """The address of the page with a pose at other angles, or dropped at a place of the map."""
+    """The address of the page with a pose at other angles, or dropped at a point of the map."""
     bench, state = workbench_of(request), state_at(body, PlanPage)
     name = str(body.get("name", ""))
     if "x" in body:

@@ -1,4 +1,4 @@
-"""Scripts and styles, by addresses that change with their content; the one of Plotly is compressed already."""
+"""Scripts and styles, by addresses that change with their content; that of Plotly is compressed already."""
 
 import gzip
 from functools import cache

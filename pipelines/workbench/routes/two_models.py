@@ -112,7 +112,7 @@ def _worded(row: dict[str, Any], sides: tuple[MissingPage, ...]) -> dict[str, An
 
 
 def _of_difference(first: float, second: float, sides: tuple[MissingPage, ...]) -> float:
-    """Most that U of a difference can be, from U of both coefficients; the same noise is in both.
+    """Upper limit of U of a difference of two coefficients that share their noise, from U of both.
 
     Generalised least squares with one covariance of the dwells for both: the estimate of a model is not correlated with what a
     larger one changes in it, so the variance of the change is that of the larger model less that of the smaller one (Hausman
@@ -125,7 +125,7 @@ def _of_difference(first: float, second: float, sides: tuple[MissingPage, ...]) 
 
 
 def _quantity(state: TwoModelsPage, found: list[Diagnosed | None]) -> str:
-    """The quantity of the address, else the one on which the effect depends that the second has besides, else force."""
+    """The quantity of the address, else that on which the additional effect of the second model depends, else force."""
     tables = [diagnosed.table for diagnosed in found[::-1] if diagnosed is not None and diagnosed.table is not None]
     wanted = [state.against, *(table.first for table in tables)]
     return next((name for name in wanted if tables and name in tables[0].drivers), "force")

@@ -53,7 +53,7 @@ def _largest(dwells: Iterable[Mapping[str, Any]]) -> float:
 
 
 def _level(largest: float, value: float) -> str:
-    """The mean of a dwell to the sixth digit of the largest, so that those near zero stand in the same places."""
+    """The mean of a dwell to the sixth digit of the largest, so that values near zero have equally many decimals."""
     return with_uncertainty(float(value), 2e-5 * largest)[0]
 
 

@@ -99,7 +99,7 @@ class Jobs:
         self._remember()
 
     def submit(self, kind: str, title: str, request: Mapping[str, Any]) -> BackgroundJob:
-        """The job for a request: the existing one, or a new one at the end of the queue."""
+        """The job for a request: the existing job, or a new job at the end of the queue."""
         name = key_of(kind, request)
         with self._lock:
             known = self._jobs.get(name)
@@ -128,7 +128,7 @@ class Jobs:
             return self._results.get(name)
 
     def known(self, kind: str, request: Mapping[str, Any]) -> BackgroundJob | None:
-        """The job of a request, if there is one."""
+        """The job of a request; None where it was not asked for."""
         with self._lock:
             return self._jobs.get(key_of(kind, request))
 
@@ -166,7 +166,7 @@ class Jobs:
             process.end()
 
     def _work(self) -> None:
-        """The loop of a thread: it owns one process, and a new one after that has ended."""
+        """The loop of a thread: it owns a process, and starts another after that has ended."""
         process: _Process | None = None
         while (name := self._queue.get()) is not None:
             with self._lock:
@@ -224,7 +224,7 @@ class Jobs:
             self._keep()
 
     def _keep(self) -> None:
-        """Store the list of jobs, so that the next server can state the interrupted ones."""
+        """Store the list of jobs, so that the next server can state the interrupted jobs."""
         with suppress(ArchiveUnusable, OSError):
             content = [job.document() for job in list(self._jobs.values())[-20:]]
             self._path.parent.mkdir(parents=True, exist_ok=True)

@@ -68,11 +68,11 @@ def save(
     why: str,
     source: str,
 ) -> tuple[Path, int]:
-    """The file and the version after every effect of ``added`` that it lacks is a version of its own.
+    """The file and its last version: each effect of ``added`` that the model lacks makes a further version.
 
     Parameters
     ----------
-    start : the model that a new file begins with · formulas : ``id = expression`` of the used ones
+    start : the model that a new file begins with · formulas : ``id = expression`` of the formulas that are used
     why, source : the reason, and the dwells with the evidence
 
     Raises

@@ -121,7 +121,7 @@ def resolve(settings: WorkbenchSettings, name: str) -> Path:
 
 
 def reading(settings: WorkbenchSettings, page: UploadPage) -> UploadReading:
-    """The file of a page as it is read: by the process of the reader, one at a time, and kept as long as the file is the same."""
+    """The file of a page as it is read: by the process of the reader, one file at a time; cached until the file changes."""
     path = resolve(settings, page.file)
     about = path.stat()
     key = (page.model_dump_json(), about.st_size, about.st_mtime_ns)
@@ -142,7 +142,7 @@ def reading(settings: WorkbenchSettings, page: UploadPage) -> UploadReading:
 
 
 def _limited(path: Path, page: UploadPage) -> UploadReading | TumblelineError:
-    """The reading, or why there is none, which is kept as well."""
+    """The reading, or the error that refuses the file; both are cached."""
     try:
         return in_reader(LOOK, path.name, look, path, page)
     except ReadingEnded as problem:

@@ -20,7 +20,7 @@ from schemas.station import StationConfig
 
 ReportProgress = Callable[[int, int, str], None]
 MOST_CHARTS = 6
-MOST_EVIDENCE = 80  # findings with a chart of their own
+MOST_EVIDENCE = 80  # findings that have a chart
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ def pose_rows(as_it_stands: Recipe, recipe: Recipe) -> list[dict[str, Any]]:
 
 
 def what_if(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """The effect of a model on the lots of the archive; kept there as evidence for its release."""
+    """The effect of a model on the lots of the archive; stored there as evidence for its release."""
     from pathlib import Path
 
     from pipelines.archive import Archive
@@ -283,7 +283,7 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
 
 
 def address_of(finding: AuditFinding) -> str:
-    """A name of a finding that stays the same as long as the finding does."""
+    """A name of a finding that does not change while the finding remains."""
     words = (finding.kind, finding.subject, str(finding.evidence.get("parameter", finding.evidence.get("figure", ""))))
     return ".".join(word for word in words if word)[:180]
 

@@ -235,7 +235,7 @@ class _Connection:
 
 
 def replaced(frame: bytes, action: WireAction, proxy: ChaosProxy) -> list[bytes]:
-    """The frames that are delivered in place of one."""
+    """The frames that are delivered instead of a frame."""
     number = (int.from_bytes(frame[:2], "big") + action.size) % 65536
     by_kind: dict[ActionKind, Callable[[], list[bytes]]] = {
         "drop": list,
