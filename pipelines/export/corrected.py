@@ -65,7 +65,7 @@ class KeptTrack:
 
 @dataclass(frozen=True)
 class Tracking:
-    """How the bias is tracked.
+    """Settings of the tracking of the bias.
 
     force : (3,), g, of all samples, whatever the recording states; None: as it states
     magnitude : g, of the force on a unit at rest; None: the recording is not searched for rest

@@ -37,7 +37,7 @@ class Firmware:
     def names(
         self, literal: Callable[[Any], str], braces: Callable[[Any, Callable[[Any], str]], str]
     ) -> dict[str, str]:
-        """What stands in the template of the low-pass."""
+        """Values of the fields in the template of the low-pass; empty without a low-pass."""
         low_pass = self.low_pass
         if low_pass is None:
             return {}
@@ -56,7 +56,7 @@ class Firmware:
     def models(
         self, symbols: dict[str, str], literal: Callable[[Any], str], braces: Callable[[Any, Callable[[Any], str]], str]
     ) -> dict[str, str]:
-        """What stands in the template of the bias: ``symbols`` are the C names of the units."""
+        """Values of the fields in the template of the bias model: ``symbols`` are the C names of the units."""
         if not self.bias:
             return {}
         texts: list[str] = []

@@ -77,7 +77,7 @@ def swept_files(
 
 
 def swept_axis(unit: str, rows: pd.DataFrame, axis: int) -> tuple[Accelerometer, list[str]]:
-    """What template 25 states of the points of one axis, and what is said of it."""
+    """The entries of template 25 for the points of one axis, and lines of text on them."""
     rows = _one_state(unit, rows)
     points = transfer_points(rows)
     c = points.conditions
@@ -112,7 +112,7 @@ def _one_state(unit: str, rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _transfer(rows: pd.DataFrame, at: int) -> tuple[TransferFunction | None, str]:
-    """One pole and one resonance by the points, where they are identified and describe the magnitude; else why not."""
+    """A transfer function of one pole and one resonance, where the points identify it and it describes them; else the reason."""
     points = transfer_points(rows)
     try:
         found: TransferDiagnosis = diagnose_transfer(points, ("second_order", "one_pole", "delay"))

@@ -168,7 +168,7 @@ def write_output(made: SimulatedOutput, output: Path) -> None:
 def simulation_document(
     made: SimulatedOutput, fit: FitOfUnit, low_pass: OutputFilter | None, seed: int | None, output: Path
 ) -> SimulateDocument:
-    """What was simulated."""
+    """The document of a simulation: unit, samples, noise, clipping and error."""
     unit, full = fit.exported, fit.exported.with_every_axis
     output_of_all = made.force.copy()
     output_of_all[:, list(unit.axes)] = made.output

@@ -58,7 +58,7 @@ def unit_in(name: str) -> str:
 
 
 def begins_with(magic: bytes) -> Callable[[bytes], bool]:
-    """What recognises the files of a format by their first bytes."""
+    """A function that recognises the files of a format by their first bytes."""
     return lambda data: data.startswith(magic)
 
 

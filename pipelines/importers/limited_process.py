@@ -135,7 +135,7 @@ def _limit(memory: int, seconds: int) -> None:
 
 @contextmanager
 def reserving(size: int) -> Generator[None]:
-    """More address space for a library that reserves so many bytes and uses few; nothing where no reading is limited."""
+    """A block with more address space, for a library that reserves many bytes and uses few; without limits it does nothing."""
     limits = resource.getrlimit(resource.RLIMIT_AS) if is_reader() else (resource.RLIM_INFINITY,) * 2
     if limits[0] == resource.RLIM_INFINITY:
         yield

@@ -79,7 +79,7 @@ class Units(BaseModel):
 
 
 class Mapping(BaseModel):
-    """How a foreign file is read."""
+    """The mapping of a foreign file: meaning of its columns, units, and the treatment of gaps and faults."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     columns: dict[str, str]

@@ -156,7 +156,7 @@ def for_fit(
 
 
 def positions(means: Array) -> int:
-    """How many of the stops (k, 3) lie apart, at most as many as a fit needs: a pose that comes again adds no shape."""
+    """Number of the stops (k, 3) that lie apart, at most as many as a fit needs: a repeated pose determines nothing new."""
     size = 0.5 * float(np.linalg.norm(np.ptp(means, axis=0)))
     apart: list[Array] = []
     for mean in means:

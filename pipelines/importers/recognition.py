@@ -163,7 +163,7 @@ _OUTPUT_UNIT = "the unit of the output: --unit-of output=g|mg|m/s^2|V|mV|LSB"
 
 
 def _open(guessed: Guesses, output: Array | None) -> list[str]:
-    """What the file does not state of its outputs."""
+    """The facts on its outputs that the file leaves open, a sentence each."""
     open_ = [guessed.triad.doubt] if guessed.triad.doubt else []
     if output is None:
         if guessed.single and not guessed.output.meaning:

@@ -50,7 +50,7 @@ _WORDS = {"frequency": ("freq",), "magnitude": ("mag", "gain", "sens"), "phase":
 
 @dataclass(frozen=True)
 class PointsLayout:
-    """What a user states: columns and units by meaning, and the uncertainty of every point, % and degrees."""
+    """The statements of a user: columns and units by meaning, and the uncertainty of every point, % and degrees."""
 
     columns: Mapping[str, str] = field(default_factory=dict[str, str])
     units: Mapping[str, str] = field(default_factory=dict[str, str])

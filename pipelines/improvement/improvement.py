@@ -178,7 +178,7 @@ class Improvement:
         return answers
 
     def _answer(self, effect: str, others: list[str], *, chosen: bool, named: bool, yes: bool) -> tuple[str, bool]:
-        """What decided on an effect, and whether it is added."""
+        """How it was decided on an effect (an option, a question, or not at all), and whether it is added."""
         if named:
             return "--effect", chosen
         if yes:

@@ -136,7 +136,7 @@ def _verified(
     also: Sequence[Callable[[Archive, VerifiedPart], None]],
     progress: Callable[[int, int], None],
 ) -> Report:
-    """One reading of an archive."""
+    """The report of a single pass over an archive."""
     from schemas import tables
 
     start, total = time.perf_counter(), VerifiedPart(archive.root, keys)

@@ -61,7 +61,7 @@ def _without_disagreements(
 def _by_folder(
     causes: dict[str, IntegrityFinding], by_path: Mapping[str, Sequence[IntegrityFinding]], differing: Collection[str]
 ) -> None:
-    """One finding for the edited manifests of one run or capture: who edits several edits them together."""
+    """Join the findings on edited manifests of a run or capture, since they are mostly edited together."""
     folders: dict[str, list[str]] = {}
     for path, cause in causes.items():
         parts = PurePosixPath(path).parts

@@ -42,7 +42,7 @@ def fresh_repeat(archive: Archive, run: Run) -> int:
 
 
 def _measurement(about: dict[str, Any]) -> tuple[Any, ...]:
-    """What decides on a measurement but the noise: poses and soaks, station, units and their slots."""
+    """All that determines a measurement except the noise: poses and soaks, station, units and their slots."""
     recipe = {key: value for key, value in about["recipe"].items() if key not in ANALYSIS_KEYS}
     lot = {key: value for key, value in about["lot"].items() if key != "repeat"}
     return recipe, lot, about["station"].get("name")

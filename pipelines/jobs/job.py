@@ -92,7 +92,7 @@ class Job:
 
     @property
     def terms(self) -> BudgetTerms:
-        """What is stated of the uncertainty."""
+        """The statements from which the uncertainty budget is computed."""
         return budget_terms(self.recipe, self.station, self.limits)
 
     @property
@@ -155,7 +155,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Request:
-    """What a command or a schedule asks for: plain values that a job is made from.
+    """The plain values from which a command or a schedule makes a job.
 
     ``slots`` say where each of the ``units`` sits; slot by slot from 0 where there are none. ``faults`` are trouble for a
     simulated station, written as on the command line.

@@ -38,7 +38,7 @@ class SeenReference(TypedDict):
 
 
 class ReferencesDocument(TypedDict):
-    """What the common residual of a run's units says of the stated table."""
+    """The judgement of the stated errors of the table by the residuals that a run's units share."""
 
     worse: Annotated[bool | None, "whether the table is worse than stated; null: cannot be judged, see `reason`"]
     reason: Annotated[str | None, "why it cannot be judged"]
@@ -118,7 +118,7 @@ UNITS = {"urad": "µrad", "arcsec": "″", "deg": "°"}
 
 
 def contradiction(judged: ReferencesDocument) -> str:
-    """What is stated and what was found, where the table is worse than stated; else empty."""
+    """A sentence on stated and found errors where the table is worse than stated; else empty."""
     if not judged["worse"]:
         return ""
     parts = [_found(reference) for reference in judged["seen"] if reference["worse"]]

@@ -130,7 +130,7 @@ def without_noise(recipe: Recipe, station: StationConfig) -> PlannedDwells:
 
 
 def _supply_not_measured(terms: BudgetTerms) -> str:
-    """What to do about the supply of a device that follows it, where it is not measured."""
+    """Advice for a device whose output follows a supply that is not measured; empty for other devices."""
     supply = None if terms.stated is None else terms.stated.supply
     if supply is None or terms.stability is None or terms.stability.ratiometric == 0.0 or supply.ratio_measured:
         return ""

@@ -22,7 +22,7 @@ IMPORTED = "(import)"  # station label of an imported run
 
 @dataclass(frozen=True)
 class RunTime:
-    """Of a finished run: time on the station's clock, s; pauses and their duration, s; repeated dwells; door openings."""
+    """Times of a finished run: on the station's clock, s; pauses and their duration, s; repeated dwells; door openings."""
 
     station_s: float = 0.0
     pauses: int = 0

@@ -32,7 +32,7 @@ class _Collector:
         self._snapshot = snapshot
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
-        """All families."""
+        """The families of all numbers, in the form of Prometheus."""
         snapshot = self._snapshot
         yield _family("info", "Version of Tumbleline", ("version",), {(version("tumbleline"),): 1.0})
         yield _family("healthy", "1 where /healthz answers 200", (), {(): snapshot.ok})

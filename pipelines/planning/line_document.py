@@ -94,7 +94,7 @@ def _rate(found: Shortest) -> LineRate:
 
 
 def _activities(line: Line, lot: str, fixture: str, placed: Placed, phases: Sequence[Phase]) -> list[LineActivity]:
-    """What happens to a lot, in order."""
+    """The activities of a lot, in order of time."""
 
     def activity(
         kind: str, begin: int, steps: int, resources: Sequence[str], temperature: float | None
@@ -125,7 +125,7 @@ def _lot(lot: str, recipe: str, fixture: str, activities: Sequence[LineActivity]
 
 
 def _resources(line: Line, lots: Sequence[Sequence[Phase]]) -> list[LineResource]:
-    """What the lots need of everything that there is a number of: the most for each of it first.
+    """The use of every counted resource by the lots, the highest use of a single item first.
 
     Of operators it is counted against the part of the day that has a shift.
     """

@@ -37,13 +37,13 @@ class NoSchedule(RecipeInvalid):
 
 @dataclass(frozen=True)
 class Stay:
-    """Names of the shared resources that a phase holds, of those among them that it keeps from the phase before, and of the new.
+    """Names of the shared resources that a phase holds, of those held since the phase before, and of the new.
 
     change : steps of the change before it; by_hand : whether that takes an operator
     """
 
     resources: tuple[str, ...]
-    kept: tuple[str, ...]
+    held: tuple[str, ...]
     changed: tuple[str, ...]
     change: int
     by_hand: bool
@@ -74,7 +74,7 @@ def step_count(seconds: float) -> int:
 
 
 def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
-    """What each phase of a lot holds."""
+    """The shared resources that each phase of a lot holds, and the changes before it."""
     needed = [
         [resource for resource in line.shared if phase.needs.intersection(resource.needed_for)] for phase in phases
     ]
@@ -206,11 +206,11 @@ class _Model:
         for phase, stay in zip(phases, stays(self.line, phases), strict=True):
             length, begin = step_count(phase.seconds), self._time()
             self.cp.add(begin >= end)
-            if phase.kind == "return" or (stay.kept and not stay.changed):
+            if phase.kind == "return" or (stay.held and not stay.changed):
                 self.cp.add(begin == end)
             elif begins:
                 self.cp.add(begin <= end + self.wait + stay.change)
-                for name in stay.kept:
+                for name in stay.held:
                     between = self._time()
                     self.cp.add(between == begin - end)
                     self.held[name].append(self.cp.new_interval_var(end, between, begin, ""))

@@ -219,7 +219,7 @@ def _row(visibility: Visibility, context: PlanContext, checked: Collection[str])
 
 
 def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: Limits | None) -> dict[str, Any] | None:
-    """What a recipe can reach on its station; None where no uncertainty is stated.
+    """The uncertainties that a recipe can reach on its station; None where no uncertainty is stated.
 
     covariance : (n, n), of the dwells of the fit as the fit sees them, g²
     """
@@ -259,7 +259,7 @@ def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: L
 
 
 def remarks(context: PlanContext, terms: BudgetTerms) -> list[str]:
-    """What a reader should know of the statement: soaks that are too short, temperatures of the chamber, gravity by formula."""
+    """Remarks on the statement of uncertainty: soaks that are too short, temperatures of the chamber, gravity by formula."""
     stated, out = terms.stated, list[str]()
     if stated is None:
         return out

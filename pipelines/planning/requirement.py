@@ -61,7 +61,7 @@ QUARTERS = 4
 
 @dataclass(frozen=True)
 class Requirement:
-    """What a recipe must achieve, and what it may consist of.
+    """The errors that a recipe must reach, and the poses, temperatures and orders that it may consist of.
 
     errors : (axes, p), g per unit of the column, largest standard error of each coefficient; with ``discrimination`` the scale of
         each column

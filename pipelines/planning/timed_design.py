@@ -203,7 +203,7 @@ def normal_matrix(rows: Array, covariance: Array) -> Array:
 
 
 def short_of(heat: Array, levels: Sequence[float]) -> float:
-    """By how much a ramp (n,), °C, misses the ends of the required range, in parts of the missed distance that is allowed.
+    """Excess of the missed part of the range by a ramp (n,), °C, over the allowed part, relative to that; 0 where none.
 
     A model is not to be extrapolated: the devices must get within :data:`REACHED` of the range.
     """

@@ -45,7 +45,7 @@ class BiasStability(InG, RecordByRecord):
     )
 
     def steps(self, part: BiasStabilityPart, recipe: Recipe) -> list[ProcedureStep]:
-        """One record."""
+        """A single record in one pose."""
         pose = Pose(name="stability", outer_deg=part.pose_deg[0], inner_deg=part.pose_deg[1])
         return [ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.lasting_s, rate_hz=part.rate_hz)]
 

@@ -168,7 +168,7 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         ]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One constant speed."""
+        """The recording at a constant speed of the arm."""
         setting = step.setting
         rate = math.degrees(math.sqrt(setting["force_g"] * 9.80665 / setting["radius_m"]))
         return equipment.spin(rate, int(setting["direction"]), setting["record_s"], slots, setting["radius_m"])
@@ -257,7 +257,7 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
 
 
 def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
-    """All terms with the input reversed; without it the four that one direction separates."""
+    """The terms of the fit: all with the input reversed; without it the four that one direction separates."""
     force, value, error = numbers(rows)
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
 

@@ -24,7 +24,7 @@ MIDDLE_HZ = 160.0
 
 @dataclass(frozen=True)
 class ComparedResult:
-    """One result of one unit.
+    """A result of a unit, with the contributions to its uncertainty.
 
     point : number of the point that it belongs to; setting : frequency, Hz; NaN: of no frequency
     u : standard uncertainties by the names of :data:`OF_RECORDS`; that of ``transverse`` is by the motion as it was measured
@@ -161,7 +161,7 @@ def transfer_curve(axis: str, diagnosis: TransferDiagnosis, frequency: Array) ->
 
 
 def reason_of(diagnosis: Judged[Any]) -> str:
-    """What a model lacks, or why it cannot be judged; empty where neither is known."""
+    """The effects that a model lacks, or why it cannot be judged; empty where neither is known."""
     missing = [" or ".join(missed.effects) for missed in diagnosis.classes]
     return diagnosis.reason or (f"it lacks {', '.join(missing)}" if missing else "")
 
@@ -172,5 +172,5 @@ def verdict_word(verdict: bool | None) -> str:  # noqa: FBT001 - it is the verdi
 
 
 def without(total: float, *parts: float) -> float:
-    """What remains of a standard uncertainty without some of its parts."""
+    """Standard uncertainty that remains after the parts are subtracted in quadrature; 0 where they exceed it."""
     return float(np.sqrt(max(0.0, total**2 - sum(part**2 for part in parts))))

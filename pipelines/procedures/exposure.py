@@ -98,7 +98,7 @@ class Exposure(InG, OnEquipment, RecordByRecord):
         return steps_of(part)
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One leg of the profile."""
+        """The recording of a leg of the profile."""
         return expose(equipment, step, slots)
 
     def points(self, part: ExposurePart, taken: Taken, device: Device) -> list[dict[str, Any]]:
@@ -154,7 +154,7 @@ class Exposure(InG, OnEquipment, RecordByRecord):
         return figures, list(texts.items())
 
     def of_lot(self, part: ExposurePart, points: pd.DataFrame) -> Texts:
-        """How far the air was from the profile at the ends of its legs."""
+        """Findings on the distance of the air from the profile at the ends of its legs."""
         legs = points[points["series"] == LEG]
         if legs.empty:
             return []
@@ -191,7 +191,7 @@ class Exposure(InG, OnEquipment, RecordByRecord):
 
 
 def _leg_rows(taken: Taken, output: Array) -> list[dict[str, Any]]:
-    """What the air of a leg was at its end beside its order, and how far the outputs (n, m) in µg went from their beginning."""
+    """Points of a leg: air at its end against the order, and largest departure of the outputs (n, m), µg, from their begin."""
     air, step = taken.record.samples[REFERENCE].output, taken.record.step
     reached = air[-max(1, round(TAIL * len(air))) :].mean(axis=0)
     humidity = step.setting["humidity_pct"] or np.nan

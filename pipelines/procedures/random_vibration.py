@@ -120,7 +120,7 @@ class RandomVibration(InG, OnEquipment, Compares):
         ]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One level of the controller's profile."""
+        """The recording at one level of the controller's profile."""
         setting = step.setting
         profile = vibration_profiles()[int(setting["profile"])]
         return equipment.random(profile, setting["level_g"], int(setting["axis"]), step.lasting_s or 0.0, slots)

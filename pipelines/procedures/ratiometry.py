@@ -84,7 +84,7 @@ class Ratiometry(SetsEquipment, RecordByRecord):
     )
 
     def steps(self, part: RatiometryPart, recipe: Recipe) -> list[ProcedureStep]:
-        """Both faces of every axis, at each voltage."""
+        """Records on both faces of every axis, at each voltage."""
         return [
             ProcedureStep(
                 f"{volt:g} V, {axis} {side}",

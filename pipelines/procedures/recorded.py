@@ -110,7 +110,7 @@ Records = Sequence[ProcedureRecord]
 
 
 class Taken(NamedTuple):
-    """What one record holds of one unit; ``number`` is that of the record within the procedure, from 0."""
+    """The part of a record that belongs to one unit; ``number`` is that of the record within the procedure, from 0."""
 
     number: int
     record: ProcedureRecord

@@ -218,7 +218,7 @@ def _felt(fit: RotationFit) -> list[str]:
 
 
 def _response(data: RotationData, fit: RotationFit) -> FigureValue:
-    """Of the model with such a gain, whether or not the model that is judged has it."""
+    """Gain of the response to rotation, from the model with that effect, whether or not the judged model has it."""
     model = data.model
     if not model.seen(GAIN):
         return FigureValue.not_determined(
@@ -260,7 +260,7 @@ def _coefficients(fit: RotationFit, letters: tuple[str, ...]) -> Texts:
 
 
 def _drive(part: RotationPart, rows: pd.DataFrame) -> Texts:
-    """How steady the drive was, and what its readings cost."""
+    """Steadiness of the drive's rate, and the uncertainty of the angle by its readings."""
     turning = rows[(rows["sweep"] >= 0) & (rows["axis"] == rows["axis"].iloc[0])]
     departure = turning.groupby("sweep")["rate_deg_s"].agg(lambda r: float((r / r.mean() - 1.0).std())).max()
     angle = np.sqrt((turning[[f"angle_{k}_deg" for k in range(6)]].to_numpy(dtype=float) ** 2).sum(axis=1).max())

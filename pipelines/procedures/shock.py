@@ -129,7 +129,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         return [before, *shocks, after]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One shock."""
+        """The recording of one shock."""
         setting = step.setting
         return equipment.shock(
             setting["peak_g"], setting["duration_s"], int(setting["axis"]), int(setting["direction"]), slots

@@ -79,7 +79,7 @@ class StepResponse(OnEquipment, FromWaveforms):
         return [on_equipment("step_generator", name, part, lasting, setting, pose="step") for name in names]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One step."""
+        """The recording of one step of voltage."""
         setting = step.setting
         return equipment.step(setting["volts"], setting["hold_s"], setting["before_s"], slots)
 

@@ -77,7 +77,7 @@ class Tilt(RecordByRecord):
         ]
 
     def missing_axes(self, part: TiltPart, letters: Sequence[str]) -> list[str]:
-        """Both axes in the plane where the device has neither."""
+        """Both axes of the plane where the device has neither; else empty."""
         plane = _plane(part)
         return [] if any(axis in letters for axis in plane) else list(plane)
 
@@ -113,7 +113,7 @@ class Tilt(RecordByRecord):
         return values, [_residual(axis, fit) for axis, fit in linear.items()]
 
     def of_lot(self, part: TiltPart, points: pd.DataFrame) -> Texts:
-        """What the plane leaves open."""
+        """The coefficients that a tilt in this plane does not determine."""
         turned = _turned(part, points)
         inside = (
             f"{'axes' if len(turned) > 1 else 'axis'} {' and '.join(turned)}: {'; '.join(left_open(in_plane=True))}"
@@ -173,7 +173,7 @@ def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltF
 
 
 def _linearity(axis: str, fit: TiltFit) -> FigureValue:
-    """By K2 and K3 where they are fitted: the largest of many residuals is noise, whatever the axis does."""
+    """Linearity by K2 and K3 where they are fitted, since the largest of many residuals is mostly noise."""
     if "second_order" in fit.names:
         value, error = (MICRO * part / fit.scale[0] for part in fit.departure)
         low, high = value - NORMAL * error, value + NORMAL * error

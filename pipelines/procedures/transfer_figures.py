@@ -160,13 +160,13 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
 
 
 def alone_text(diagnosis: TransferDiagnosis) -> str:
-    """What is said of points that depart alone; empty without any."""
+    """A sentence on single points that depart unlike any effect; empty without such points."""
     where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.alone_hz)
     return f"a point departs alone, and not as any effect would, at {where}; measure there again" if where else ""
 
 
 def _remains(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
-    """What no effect explains: single points, or a deviation of many."""
+    """Findings on what no effect explains: single points, or a deviation of many."""
     if diagnosis.alone_hz:
         return [("bad point", alone_text(diagnosis))]
     text = "a significant deviation remains that no effect of the catalogue describes"

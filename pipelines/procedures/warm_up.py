@@ -46,7 +46,7 @@ class WarmUp(InG, RecordByRecord):
     )
 
     def steps(self, part: WarmUpPart, recipe: Recipe) -> list[ProcedureStep]:
-        """One record directly after power-on."""
+        """A single record, directly after power-on."""
         pose = at_rest("warm-up")
         lasting, rate = part.lasting_s, part.rate_hz
         return [

@@ -16,7 +16,7 @@ from stations.devices.teds_memory import PAGE, TedsMemory
 
 @dataclass
 class TedsOutcome:
-    """What became of one device.
+    """The outcome of writing the TEDS of one device.
 
     pages : by axis, in the order of the memory · before : the whole memory before the first write
     """

@@ -58,7 +58,7 @@ class EffectView:
 
     @property
     def fall(self) -> float:
-        """What the effect takes off the squares of the residuals."""
+        """Fall of the mean square of the residuals by the effect, µg²; 0 without a fit with it."""
         return 0.0 if self.after is None else float(np.nanmean(self.before**2) - np.nanmean(self.after**2))
 
     @property
@@ -69,7 +69,7 @@ class EffectView:
 
     @property
     def title(self) -> str:
-        """What the picture shows."""
+        """Title of the picture."""
         depends = (
             f", on which {self.effect} depends" if self.effect and not self.quantity.startswith(CONTRIBUTION) else ""
         )

@@ -96,7 +96,7 @@ LABELS = axis_labels() | {"approach": "change of force at the move before / g"}
 
 
 def recorded_quantities(problem: Problem) -> list[DriverValues]:
-    """What was recorded with the dwells of a lot, in the units that people read."""
+    """The quantities recorded with the dwells of a lot, in the units of display."""
     state = problem.lot.state
     quantities: list[DriverValues] = []
     for driver in drivers_of(problem):

@@ -46,7 +46,7 @@ def model_chart(dwells: pd.DataFrame, residuals: pd.DataFrame) -> Chart:
 
 
 def quantities(residuals: pd.DataFrame, dwells: pd.DataFrame) -> dict[str, str]:
-    """What the residuals of a unit can be drawn against, by name, with the label: force, time, what was recorded, pose.
+    """Quantities against which residuals of a unit can be drawn, by name, with label: force, time, what was recorded, pose.
 
     Of what was recorded, that which varied between its dwells.
     """

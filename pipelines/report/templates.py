@@ -22,7 +22,7 @@ def _environment() -> Environment:
 
 
 def plain_name(effect_id: str) -> str:
-    """What an effect is, in a few words for readers of a page; empty for an id that is not of the catalogue."""
+    """The plain name of an effect, for readers of a page; empty for an id that is not of the catalogue."""
     if effect_id not in effects.catalogue():
         return ""
     text = (type(effects.get(effect_id)).__doc__ or "").strip().splitlines()[:1]

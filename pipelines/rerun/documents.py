@@ -90,7 +90,7 @@ LotFigures = TypedDict(
 
 
 class GroupFigures(LotFigures):
-    """The same of one kind of device on one station."""
+    """The figures of the lots of one kind of device on one station."""
 
     station: str
     device: str

@@ -40,7 +40,7 @@ class StageCall:
 
 @dataclass(frozen=True)
 class ImportedData:
-    """What was imported, as the stages need it.
+    """The properties of imported data that decide on the stages.
 
     history : whether temperatures between the dwells were; known : whether the poses are known, otherwise only the norm of
     gravity is; gravity : where it was measured, g
@@ -60,7 +60,7 @@ class ImportedData:
 
 
 def imported(run: Run, dwells: pd.DataFrame) -> ImportedData:
-    """What a run was imported with."""
+    """The properties of the data of an imported run."""
     return ImportedData("history" in run.tables(), has_poses(dwells), gravity_of_import(run.about))
 
 

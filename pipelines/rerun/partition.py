@@ -48,7 +48,7 @@ Result = TypeVar("Result")
 
 
 def _each(part: Batch, call: Callable[[Archive, str], Result], failed: Callable[..., Result]) -> list[Result]:
-    """What a call makes of every run of a batch; a run that fails has an error, the others continue."""
+    """The results of a call for every run of a batch; a run that fails gives an error, the others continue."""
     archive, results = Archive(part.archive), list[Result]()
     for run_id in part.runs:
         try:

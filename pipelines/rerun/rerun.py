@@ -25,7 +25,7 @@ samples it reads are not in the archive; worked out."""
 
 @dataclass(frozen=True)
 class RerunOutcome:
-    """What became of one run, also in the JSON document: its re-run, what had changed, and how every stage came about."""
+    """The outcome of one run, also in the JSON document: its re-run, what had changed, and how every stage came about."""
 
     run: str
     new: Annotated[str, "id of the re-run; the run's own if nothing changed, empty if it failed"] = ""
@@ -80,7 +80,7 @@ def again(
 
 
 def _done(old: Run, new: BufferedRun, plan: Plan, *, raw: bool) -> dict[str, str]:
-    """What became of every stage."""
+    """The outcome of every stage (computed, reused or kept), by name."""
     work = StageRunner(old, new, raw=raw)
     return {step.name: work.do(step) for step in plan.steps}
 
@@ -113,7 +113,7 @@ def has_static_record(run: Run) -> bool:
 
 
 def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
-    """What a re-run would do otherwise than the run did: by stage, ``code``, ``model``, ``limits`` or another parameter.
+    """The differences of a re-run from the run: by stage, ``code``, ``model``, ``limits`` or another parameter.
 
     raw : whether the raw samples are there; without them the tables of the stages that read them are reused
     """
@@ -166,7 +166,7 @@ class StageRunner:
         self._before = set(old.tables())
 
     def do(self, step: StageCall) -> str:
-        """What became of a stage; its outputs are in the new run now."""
+        """Run or reuse a stage, so that its outputs are in the new run; return its outcome."""
         if step.name == "import" or (step.name in {"capture", *FROM_SAMPLES} and not self.raw):
             return self._keep(step)
         inputs = {name: self._hash(name) for name in step.inputs}

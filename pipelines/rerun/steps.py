@@ -92,7 +92,7 @@ def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
 
 
 def without_provenance(about: dict[str, Any]) -> dict[str, Any]:
-    """What ``run.json`` holds, without who made it, where and when."""
+    """The content of ``run.json`` without author, host and time."""
     return {key: value for key, value in about.items() if key not in PROVENANCE}
 
 
@@ -113,7 +113,7 @@ RAW = (*FROM_SAMPLES, "noise")  # stages that read the raw samples
 
 @dataclass(frozen=True)
 class Plan:
-    """All that is to be done to a run.
+    """The stages of a re-run, in order.
 
     name : begins the new run's name; about : the content of its ``run.json``; decisive : what its result depends on
     """
@@ -125,7 +125,7 @@ class Plan:
 
 
 def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
-    """What is to be done to a run, with another model or other limits where they are given.
+    """The plan of a re-run, with another model or other limits where they are given.
 
     left_out : dwells of an import that are left out, as (unit, dwell)
     """
@@ -150,7 +150,7 @@ def _captured(run: Run, change: ModelChange) -> Plan:
 
 
 def _capture_step(run: Run, job: ArchivedJob) -> StageCall:
-    """What the run keeps of its capture: all that it has, which for runs of earlier versions is less than today."""
+    """The step that takes over the tables of the capture: those that the run has, fewer for runs of earlier versions."""
     there = run.tables()
     more = tuple(name for name in ("events", "soaks") if name in there or "readings" not in there)
 

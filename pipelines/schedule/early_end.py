@@ -58,7 +58,7 @@ class EarlyEnd(TypedDict):
 
 
 def early_end(run: Run) -> EarlyEnd | None:
-    """What ``[stop]`` of a run's recipe did; None without it."""
+    """The effect of ``[stop]`` on a run; None where the recipe has none."""
     about = run.about
     if not (about.get("recipe") or {}).get("stop") or "events" not in run.tables():
         return None
@@ -89,7 +89,7 @@ def early_end(run: Run) -> EarlyEnd | None:
 
 
 def _not_reached(run: Run, recipe: Recipe) -> Iterator[NotReached]:
-    """What ``[stop]`` asks for over the uncertainties of a run, of the noise alone where nothing is stated."""
+    """Quantities whose uncertainty (by noise alone where nothing is stated) exceeds what ``[stop]`` asks for."""
     if recipe.stop is None or not {"uncertainties", "coefficients"} <= set(run.tables()):
         return
     stated = run.table("uncertainties")

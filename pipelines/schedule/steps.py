@@ -41,7 +41,7 @@ class Step:
 
     @property
     def turns(self) -> tuple[Turn, ...]:
-        """What the table turns during the record."""
+        """The turns of the table during the record."""
         return self.order.turns if self.order is not None else ()
 
     def lasts(self, recipe: Recipe) -> float:

@@ -57,7 +57,7 @@ def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None 
 
 
 def _lots(tables: LotTables, effects: Sequence[str]) -> list[LotArrays]:
-    """What is fitted together: units with the same dwells, or all where the model has values that they share."""
+    """The parts of a lot that are fitted together: units with the same dwells, or all where the model has shared values."""
     if len(tables.parts) == 1:
         return [tables.fitted_kinds]
     sensor, station = design.split(effects)

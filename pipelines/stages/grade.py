@@ -158,7 +158,7 @@ def grade(
 
 
 def _budget(evidence: GradeEvidence) -> Callable[[str], Mapping[tuple[str, str], BudgetRow]]:
-    """What gives the quantities of the budget of a unit."""
+    """A function from a unit to the rows of its budget, by quantity and axis."""
     if evidence.budget is not None:
         return evidence.budget.of
     by_unit: dict[str, dict[tuple[str, str], BudgetRow]] = {}

@@ -32,7 +32,7 @@ UNIT = "µg/√Hz"
 
 @dataclass
 class _Soak:
-    """What the dwells of one soak have shown of one unit: sums over the records of equal length.
+    """Sums over the records of equal length of one unit in one soak.
 
     total : (axes, t), of Allan variances, output unit squared · step : (axes,), finest step between digits, 0 for fine ones
     """
@@ -176,7 +176,7 @@ def _change(table: pd.DataFrame, rows: pd.DataFrame, p: float, axes: int) -> dic
 
 
 def verdict(ratio: float, half: float, p: float, axes: int) -> str:
-    """What noise of an axis does over temperature.
+    """Verdict on the white noise of an axis over temperature: it grows, falls, differs, is steady, or cannot be told.
 
     Parameters
     ----------

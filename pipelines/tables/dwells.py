@@ -52,7 +52,7 @@ class Measured:
     reference: str
 
     def pick(self, units: list[int]) -> Measured:
-        """The same for some units."""
+        """The dwells of the units with these indices."""
         index = np.asarray(units, dtype=np.intp)
         values = {field.name: getattr(self.readings, field.name) for field in fields(self.readings)}
         arrays = {name: value[index] for name, value in values.items() if isinstance(value, np.ndarray)}
@@ -119,12 +119,12 @@ class LotTables:
 
     @cached_property
     def with_gaps(self) -> LotArrays:
-        """The same of units that lack dwells which others have, together."""
+        """The dwells of the fit of all units together, with gaps where a unit lacks a dwell that another has."""
         return lot_arrays(self.dwells, self.history, KINDS, gaps=True)
 
     @cached_property
     def all_kinds(self) -> LotArrays:
-        """All dwells, since an effect with memory depends on the dwell before."""
+        """The dwells of every kind, since an effect with memory depends on the dwell before."""
         if self.dwells["kind"].isin(list(KINDS)).all():
             return self.fitted_kinds
         return lot_arrays(self.dwells, self.history)
@@ -340,7 +340,7 @@ def shows_misalignment(dwells: pd.DataFrame) -> bool:
 
 
 def undetermined_responses(state: State) -> list[str]:
-    """What cannot be determined from the poses, and what to measure for it."""
+    """Sentences on the responses that the poses do not determine, and on what to measure for them."""
     names = undetermined(state)
     if not names:
         return []

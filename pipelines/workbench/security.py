@@ -242,7 +242,7 @@ def session_holds(token: str, origin: str, value: str) -> bool:
 
 
 def change_proof(token: str, origin: str, value: str) -> str:
-    """What the page of a session sends with its changes."""
+    """The token that the page of a session sends with its changes."""
     return _code(token, "change", origin, value)
 
 

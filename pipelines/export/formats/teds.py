@@ -112,7 +112,7 @@ def with_period(unit: str, certificate: Calibration | None, sheet: DataSheet) ->
 
 
 def heading(unit: str, certified: str, run: str, sheet: DataSheet, serial: int) -> list[str]:
-    """What the page states beside the calibration, for people."""
+    """Lines of text on what the page states beside the calibration."""
     return [
         f"accelerometer {unit}, run {run}: IEEE 1451.4 basic TEDS and template 25, {PAGE_BYTES} bytes for each axis",
         certified,
@@ -141,7 +141,7 @@ def axis_lines(stated: dict[str, Accelerometer]) -> list[str]:
 
 
 def _left_out(unit: UnitCalibration, stated: dict[str, Accelerometer]) -> list[str]:
-    """What a reader's V / sensitivity leaves of the calibration, µg; the axes without an output are known."""
+    """Error of a reader that divides V by the sensitivity, against the calibration, µg; the axes without an output are known."""
     full = unit.with_every_axis
     scale = np.ones(3)
     for sensor in stated.values():

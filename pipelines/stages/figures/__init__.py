@@ -66,7 +66,7 @@ SPELT = str.maketrans({"µ": "u", "²": "2", "³": "3", "/": "_", "√": "rt"})
 
 
 def figure_label(name: str) -> str:
-    """What a figure is, in a few words; of one of a procedure, or of another version, the words of its key without the unit."""
+    """The label of a figure; for figures of procedures and of other versions, its key in words, without the unit."""
     if name in FIGURES:
         return FIGURES[name].label
     unit = UNITS.get(name, "").replace("%", "percent").translate(SPELT)

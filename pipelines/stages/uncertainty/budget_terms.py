@@ -50,7 +50,7 @@ class BudgetTables:
         return (self.lot or LotTables(self.dwells, self.history)).fitted_kinds
 
     def parts(self) -> list[BudgetTables]:
-        """Those of units with the same dwells; none where no unit was fitted."""
+        """The tables in parts whose units have the same dwells; empty where no unit was fitted."""
         lots = (self.lot or LotTables(self.dwells, self.history)).parts
         if self.coefficients.empty or len(lots) == 1:
             return [] if self.coefficients.empty else [self]
@@ -88,21 +88,15 @@ class BudgetTerms:
 
     @property
     def follows(self) -> FollowedSupply | None:
-        """How the outputs follow a supply that is measured; None where it is not measured, or they do not follow it.
+        """How the outputs follow the measured supply; None where it is not measured, or the outputs do not follow it.
 
         None as well for runs of earlier versions, which state no nominal supply and are as they were read.
         """
-        unit = self.stability
+        dut = self.stability
         supply = None if self.stated is None else self.stated.supply
-        if (
-            unit is None
-            or unit.supply_V is None
-            or supply is None
-            or not supply.ratio_measured
-            or unit.ratiometric == 0.0
-        ):
+        if dut is None or dut.supply_V is None or supply is None or not supply.ratio_measured or dut.ratiometric == 0.0:
             return None
-        return FollowedSupply(unit.supply_V, unit.ratiometric)
+        return FollowedSupply(dut.supply_V, dut.ratiometric)
 
     @property
     def switch_on_dof(self) -> float:
@@ -116,7 +110,7 @@ class BudgetTerms:
         return self.stated is not None and reads_own_temperature(self.stated, self.stability)
 
     def document(self) -> dict[str, Any]:
-        """As JSON values."""
+        """The statements as JSON values, for the parameters of a stage."""
         if self.stated is None:
             return {"uncertainty": None}
         return {

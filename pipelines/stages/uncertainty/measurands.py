@@ -58,7 +58,7 @@ class VarianceParts:
 
 @dataclass(frozen=True)
 class LotBudget:
-    """What a budget is computed from: dwells, calibration, tables, statements, and the influences through the fit."""
+    """The inputs of a budget: dwells, calibration, tables, statements, and the influences through the fit."""
 
     lot: LotArrays
     calibration: Calibration

@@ -29,7 +29,7 @@ _TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True)
 class AxisErrors:
-    """What makes the error of one axis in a use, (units,) each where not said otherwise; µg.
+    """The parts of the error of one axis in a use, (units,) each where not said otherwise; µg.
 
     run, mean : RMS and mean of the errors of the verification
     expected, dof : RMS of a correct model, and degrees of freedom of its square

@@ -203,7 +203,7 @@ def _referred(source: UncertaintySource, shares: Array) -> dict[str, Any]:
 
 
 def source_of(entry: Entry) -> str:
-    """What an entry rests on: a reference standard, or its source."""
+    """The origin of an entry: its reference standard, or its source."""
     return f"reference {entry.reference}" if entry.reference else entry.origin
 
 

@@ -115,7 +115,7 @@ def _changes(bench: Workbench, this: Run, other: Run) -> dict[tuple[str, str], t
 
 
 def _measurement(run: Run) -> str:
-    """What all analyses of one measurement have in common: its capture, else the file that it was imported from, else the run."""
+    """The identity of the measurement that a run analyses: its capture, else the file that it was imported from, else the run."""
     about = run.about
     source = (about.get("source") or {}).get("sha256")
     return str(about.get("capture") or source or about.get("rerun_of") or run.id)

@@ -111,7 +111,7 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
 
 
 def _against(bench: Workbench, state: UnitPage) -> str:
-    """What the residuals are drawn against: as the address says, else what they depend on most, if anything is missing."""
+    """The quantity against which residuals are drawn: that of the address, else that on which they depend most."""
     if state.against:
         return state.against
     tables = bench.archive.run(state.run).tables()

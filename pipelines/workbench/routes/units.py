@@ -37,7 +37,7 @@ def units(request: Request) -> Response:
 
 @router.get("/units/table.csv")
 def table(request: Request) -> Response:
-    """All units of the search."""
+    """The units of the search as a CSV file."""
     bench, state, _ = asked(request, UnitsPage)
     return table_csv(bench.index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING)).documents(), "units")
 
