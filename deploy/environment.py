@@ -115,7 +115,7 @@ def _version(folder: Path) -> str | None:
 
 
 def reason(text: str, lock: Path, folder: Path) -> str:
-    """What pip's output says: the package, what was found and the remedy, in one line."""
+    """The cause of a failure by pip's output: the package, what was found and the remedy, in one line."""
     words = {
         "lock": lock.name,
         "folder": folder,
@@ -171,7 +171,7 @@ def _stamp(folder: Path, name: str) -> Path:
 
 
 def _content(name: str) -> str:
-    """What an installation was made from: the lock, and the metadata of the product."""
+    """Identity of an installation: the lock, and the metadata of the product."""
     read = [(ROOT / file).read_bytes() for file in (f"requirements-{name}.lock", "pyproject.toml")]
     return hashlib.sha256(b"".join(read)).hexdigest()
 

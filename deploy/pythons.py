@@ -35,7 +35,7 @@ class Interpreter(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What was seen with a Python."""
+    """The result of the tests with a Python."""
 
     interpreter: Interpreter
     set_up_s: float

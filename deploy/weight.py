@@ -31,7 +31,7 @@ KINDS = {
 
 
 class Weight(NamedTuple):
-    """What one part of the product installs: packages, their size without their own tests' compiled modules, and licences."""
+    """The installation of one part of the product: packages, their size without compiled modules of their tests, and licences."""
 
     part: str
     packages: tuple[str, ...]

@@ -44,7 +44,7 @@ class ImportReferences(Strict):
         return self
 
     def station(self) -> dict[str, Any]:
-        """As the station of a run that was captured."""
+        """The statements in the form of a captured run's station."""
         return {
             "name": self.name,
             "kind": "imported",
@@ -55,7 +55,7 @@ class ImportReferences(Strict):
         }
 
     def recipe(self) -> dict[str, Any]:
-        """As the keys of the recipe of a run that was captured."""
+        """The statements as keys of a captured run's recipe."""
         parts = {"stability": self.stability, "certificate": self.certificate}
         return {name: part.model_dump(mode="json") for name, part in parts.items() if part is not None}
 

@@ -37,7 +37,7 @@ def not_installed(problem: BaseException | None) -> str | None:
 
 
 def missing_in(log: str) -> str | None:
-    """The same for the output of a process of this environment; None where it names no missing library."""
+    """As :func:`not_installed`, for the output of a process of this environment; None where it names no missing library."""
     names = re.findall(r"^ModuleNotFoundError: No module named '([\w]+)", log, re.MULTILINE)
     return to_complete(names[-1], "is not installed") if names and names[-1] not in _OWN else None
 

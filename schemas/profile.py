@@ -63,11 +63,11 @@ class Register(Strict):
 
     @property
     def writable(self) -> bool:
-        """Whether it may be written at all."""
+        """Whether the register may be written."""
         return self.access != "read"
 
     def with_decimals(self, decimals: int) -> "Register":
-        """The same register, its values in steps of ten to the power of minus ``decimals``."""
+        """The register with its values in steps of ten to the power of minus ``decimals``."""
         return self.model_copy(update={"scale": self.scale * 10.0**-decimals, "scaled_by": ""})
 
     @property
@@ -120,7 +120,7 @@ class Command(Strict):
 
     @property
     def writable(self) -> bool:
-        """Whether it may be set."""
+        """Whether the command may be set."""
         return bool(self.tell)
 
 

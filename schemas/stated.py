@@ -106,7 +106,7 @@ class Entry(OnlyStated):
 
     @property
     def origin(self) -> str:
-        """Where the figure comes from, if from no reference standard."""
+        """Origin of a figure that comes from no reference standard."""
         return self.source
 
 

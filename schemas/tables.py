@@ -40,7 +40,7 @@ class Column:
     missing: bool = False
 
     def contract(self) -> pa.Column:
-        """The same as a column of the library that explains what is wrong."""
+        """The column in the form of the library that explains violations."""
         import pandera.pandas as pa  # noqa: PLC0415 - a table without an error does not need it
 
         checks = [pa.Check.ge(self.low)] if self.low is not None else []
@@ -83,7 +83,7 @@ class Table:
 
 
 def each(column: Column, *names: str) -> dict[str, Column]:
-    """The same column under several names."""
+    """A column under each of several names."""
     return dict.fromkeys(names, column)
 
 

@@ -70,7 +70,7 @@ class Gravity(RelativeEntry):
         return standard
 
     def states(self, part: str = "") -> bool:
-        """Whether it has an uncertainty, that of the formula where none is stated, or is said to be exact."""
+        """Whether the entry has an uncertainty, that of the formula where none is stated, or is said to be exact."""
         return self.exact or self.relative().u > 0.0
 
     @property
@@ -133,7 +133,7 @@ class Settling(Entry):
     scope: Scope = "run"
 
     def states(self, part: str = "") -> bool:
-        """By its time constants."""
+        """Whether the entry is stated, by its time constants."""
         return True
 
     @property

@@ -210,7 +210,7 @@ def _imported(
 
 
 def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str]:
-    """What is neither stated nor recognised."""
+    """Keys and columns that are neither stated nor recognised; empty where the mapping is complete."""
     blanks = {"COLUMN", "UNIT", "HZ"}
     left = [f"column {m}" for m, name in keys["columns"].items() if name in blanks]
     left += [f"unit of {what}" for what, unit in keys["units"].items() if unit in blanks]

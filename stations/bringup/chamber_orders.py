@@ -22,7 +22,7 @@ class ChamberOrders:
     silence_s: float
 
     def run(self) -> None:
-        """All steps in order; a step that fails ends only itself."""
+        """Take all steps in order; a step that fails does not prevent the next."""
         self.orders.step("state of the controller", self._state)
         self.orders.step("a kelvin and back", self._set)
         self.orders.step("off and on", self._switch)

@@ -28,7 +28,7 @@ class Orders:
     note: Callable[[str], None] = field(default=lambda _: None)
 
     def step(self, name: str, act: Callable[[], None]) -> None:
-        """One step; what the station raises ends it and is a finding."""
+        """Take one step; an error of the station ends it and is a finding."""
         self.note(f"step: {name}")
         try:
             act()

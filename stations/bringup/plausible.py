@@ -63,7 +63,7 @@ def _bits(register: Register, value: int) -> bool | None:
 
 
 def votes(profile: Profile, words: Mapping[str, Sequence[int]], order: WordOrder, *, orderly: bool) -> tuple[int, int]:
-    """How many registers have a plausible and how many an implausible value in a word order.
+    """Numbers of registers with a plausible and with an implausible value in a word order.
 
     words : by register, as they were read
     orderly : only registers of two words, which alone depend on the order; else all
@@ -80,7 +80,7 @@ def votes(profile: Profile, words: Mapping[str, Sequence[int]], order: WordOrder
 
 
 def depends_on_order(register: Register) -> bool:
-    """Whether its value depends on the order of its words or bytes."""
+    """Whether the value of a register depends on the order of its words or bytes."""
     return register.type in {"uint32", "int32", "float32"}
 
 

@@ -22,7 +22,7 @@ MISSING = "bring-up: nothing answers"
 
 @dataclass
 class Answer:
-    """What a device with some id answers to the registers of the profile."""
+    """The answers of a device with some id to reads of the registers of the profile."""
 
     device_id: int
     words: dict[str, list[int]]
@@ -92,7 +92,7 @@ def probes(profile: Profile) -> list[Register]:
 
 
 def _answers(target: Target, given_id: int, *, search_line: bool, person: Person) -> list[Answer]:
-    """What answers at any id, at the first line setting at which anything does."""
+    """The answers of all ids, at the first line setting with any answer."""
     ids = [given_id] if given_id else list(FIRST_IDS)
     for device in _settings(target.link.device, search_line=search_line):
         target.link.device = device

@@ -23,7 +23,7 @@ ON_PANEL = " on the panel"
 
 @dataclass
 class Survey:
-    """What the registers hold, and how long answers took, s."""
+    """Values of the registers, and times of the answers, s."""
 
     values: dict[str, Value] = field(default_factory=dict[str, Value])
     seconds: list[float] = field(default_factory=list[float])
@@ -83,7 +83,7 @@ def _read(target: Target, values: Values, entry: Register | Command, found: Surv
 
 
 def _judge(findings: Findings, entry: Register | Command, value: Value) -> None:
-    """What the value says of its register: inside its limits, named, possible."""
+    """Findings on the value of a register: whether it is inside its limits, named, possible."""
     shown, unit, (low, high) = told(entry, value), entry.unit, limits_of(entry)
     numbers = value if isinstance(value, list) else [] if isinstance(value, str) else [value]
     if numbers and not all(low <= number <= high for number in numbers):

@@ -148,7 +148,7 @@ class FrameRecorder:
 
 
 def meaning(request: bytes, registers: Sequence[Register]) -> str:
-    """What a Modbus request does, with the names of the registers that it touches, in the order of their addresses."""
+    """A Modbus request in words, with the names of the registers that it touches, in the order of their addresses."""
     function = request[0]
     if function not in SPACE_OF or len(request) < 5:
         return f"function {function}"

@@ -141,12 +141,12 @@ class MemoryBank:
 
     @property
     def flash(self) -> Flash:
-        """Its memory."""
+        """The flash memory of the unit in the slot."""
         return self.world.flash[self.unit]
 
     @property
     def teds(self) -> Eeprom:
-        """Its memory on the signal line."""
+        """The TEDS memory on the signal line of the unit in the slot."""
         return self.world.teds[self.unit]
 
     def sources(self) -> dict[str, Source]:

@@ -281,7 +281,7 @@ class Bench:
         return np.clip(counts, -preset.largest_count - 1, preset.largest_count) * preset.lsb
 
     def _as_reference(self, reference: Array, rng: np.random.Generator, conditions: frozenset[str]) -> Array:
-        """What the reference sensor reads of (n, 3) g: its error of calibration, noise, and a range that may clip."""
+        """Readings of the reference sensor of (n, 3) g: its error of calibration, noise, and a range that may clip."""
         felt = 0.0 * reference if "reference_cable_off" in conditions else reference
         read = felt * (1.0 + self.rig.reference_error) + 2e-4 * rng.standard_normal(reference.shape)
         if "clipped_reference" in conditions:

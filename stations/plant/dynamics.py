@@ -64,7 +64,7 @@ class Dynamics:
 
 @dataclass(frozen=True)
 class DynamicTruth:
-    """What a unit really is in frequency: sprung mass, two-pole low-pass behind it, delay, clock, quadratic spring."""
+    """True dynamic parameters of a unit: sprung mass, two-pole low-pass behind it, delay, clock, quadratic spring."""
 
     natural_hz: float
     damping: float
@@ -87,7 +87,7 @@ class DynamicTruth:
 
 @dataclass(frozen=True)
 class Rig:
-    """What the equipment really is: its errors, which all runs of a station share."""
+    """True errors of the test equipment, which all runs of a station share."""
 
     reference_error: float
     distortion: float

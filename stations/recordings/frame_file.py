@@ -52,12 +52,12 @@ class Exchange:
 
     @property
     def writes(self) -> bool:
-        """Whether it is an order; a line of text is an order unless it is a query."""
+        """Whether the exchange is an order; a line of text is an order unless it is a query."""
         return not self.request.endswith(b"?") if self.text else self.request[:1] != b"" and self.request[0] in WRITES
 
     @property
     def key(self) -> tuple[str, int, bytes]:
-        """What is asked of whom."""
+        """Link, device and request, by which a replay finds the answer."""
         return self.link, self.device_id, self.request
 
 

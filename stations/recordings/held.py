@@ -20,7 +20,7 @@ MALFORMED = "malformed: "
 
 @dataclass
 class Held:
-    """What is left of a recording."""
+    """The part of a recording that is not replayed yet."""
 
     recording: FrameFile
     _left: deque[Item] = field(default_factory=deque["Item"])

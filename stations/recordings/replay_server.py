@@ -28,7 +28,7 @@ Who = tuple[str, int]
 
 @dataclass
 class _Followed:
-    """Where a device is in its recording."""
+    """The position of a device in its recording."""
 
     orders: list[int] = field(default_factory=list[int])
     by_request: dict[bytes, list[int]] = field(default_factory=lambda: defaultdict(list))

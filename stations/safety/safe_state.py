@@ -36,7 +36,7 @@ class Reached:
         return not self.failed
 
     def sentence(self) -> str:
-        """Both in one sentence."""
+        """Completed and failed commands in a sentence."""
         failed = [f"{what} not done ({why})" for what, why in self.failed.items()]
         return "; ".join([*self.done, *failed])
 

@@ -68,7 +68,7 @@ def fault(*targets: str) -> Callable[[Callable[..., Effect | None]], None]:
 
 @dataclass
 class Fault:
-    """One fault of one plant, with the figures of its order or their defaults."""
+    """A fault of a plant, with the figures of its order or their defaults."""
 
     order: FaultOrder
     kind: Kind

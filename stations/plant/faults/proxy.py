@@ -27,7 +27,7 @@ CHUNK = 4096
 
 @dataclass(frozen=True)
 class WireAction:
-    """What happens to one frame.
+    """The treatment of a frame.
 
     ``drop`` loses it. ``delay`` delays it and all later frames by ``delay_s``. ``duplicate`` delivers it twice. ``truncate``
     removes its last ``size`` bytes and closes. ``garble`` changes ``size`` bytes. ``half_open``: from here on the connection
@@ -140,7 +140,7 @@ class ChaosProxy:
 
 
 class _Connection:
-    """One client's connection: a thread for each direction."""
+    """The connection of a client: a thread for each direction."""
 
     def __init__(self, proxy: ChaosProxy, client: socket.socket, server: socket.socket) -> None:
         self._proxy = proxy
