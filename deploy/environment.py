@@ -59,14 +59,14 @@ def set_up(name: str, folder: Path, *, asked: bool = False) -> None:
     """Make or complete the environment; says so where packages are installed.
 
     name : of the lock, ``requirements-NAME.lock``
-    asked : whether this version of Python was asked for, so that an environment of another one is made anew
+    asked : whether this version of Python was asked for, so that an environment of another version is made anew
     """
     lock = ROOT / f"requirements-{name}.lock"
     why = wrong_with(folder, asked=asked)
     if why:
         _say(f"{folder.relative_to(ROOT)}: {why}; it is made anew")
         shutil.rmtree(folder)
-    if not why and any(_is_current(folder, one) for one in (name, *HELD_BY.get(name, ()))):
+    if not why and any(_is_current(folder, lock_name) for lock_name in (name, *HELD_BY.get(name, ()))):
         return
     python = f"Python {platform.python_version()}"
     _say(
@@ -115,14 +115,14 @@ def _version(folder: Path) -> str | None:
 
 
 def reason(text: str, lock: Path, folder: Path) -> str:
-    """What pip's output says: the package, what was found and the remedy, in one line."""
+    """The cause of a failure by pip's output: the package, what was found and the remedy, in one line."""
     words = {
         "lock": lock.name,
         "folder": folder,
         "python": folder / "bin" / "python",
         "system": f"Python {platform.python_version()} on {platform.system()} {platform.machine()}",
     }
-    collected = [one.rpartition("/")[2] for one in COLLECTED.findall(text)] or ["pip"]
+    collected = [collected.rpartition("/")[2] for collected in COLLECTED.findall(text)] or ["pip"]
     for pattern, found, remedy in FAILURES:
         hit = pattern.search(text)
         if hit is not None:
@@ -160,9 +160,9 @@ def _install(words: list[str], folder: Path, lock: Path, before: str | None) -> 
 
 
 def _compile(folder: Path) -> None:
-    """Compile the libraries on all processors, without tests of their own, which nobody runs here: an eleventh of the size."""
+    """Compile the libraries on all processors, without their tests, which nobody runs here: an eleventh of the size."""
     compiled = ["-m", "compileall", "-qq", "-j", "0", "-x", "/tests?/", *folder.glob("lib/python3*/site-packages")]
-    # a file that does not compile is one of another version of Python: its library does not import it
+    # a file that does not compile is for another version of Python: its library does not import it
     subprocess.run([folder / "bin" / "python", *compiled], stdout=subprocess.DEVNULL, check=False)  # noqa: S603
 
 
@@ -171,7 +171,7 @@ def _stamp(folder: Path, name: str) -> Path:
 
 
 def _content(name: str) -> str:
-    """What an installation was made from: the lock, and the metadata of the product."""
+    """Identity of an installation: the lock, and the metadata of the product."""
     read = [(ROOT / file).read_bytes() for file in (f"requirements-{name}.lock", "pyproject.toml")]
     return hashlib.sha256(b"".join(read)).hexdigest()
 
@@ -188,8 +188,8 @@ def _say(line: str) -> None:
 
 def main(words: list[str]) -> int:
     """Set up; a failure is one line."""
-    with Path(__file__).open(encoding="utf-8") as own:
-        fcntl.flock(own, fcntl.LOCK_EX)  # make -j calls this for two locks at a time
+    with Path(__file__).open(encoding="utf-8") as script:
+        fcntl.flock(script, fcntl.LOCK_EX)  # make -j calls this for two locks at a time
         try:
             set_up(words[0], ROOT / words[1], asked="--asked" in words[2:])
         except NotSetUp as problem:

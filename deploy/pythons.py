@@ -30,12 +30,12 @@ class Interpreter(NamedTuple):
 
     @property
     def minor(self) -> int:
-        """The second number of a version of Python 3; -1 for another one."""
+        """The second number of a version of Python 3; -1 for other programs."""
         return int(self.version.split(".")[1]) if self.version.startswith("3.") else -1
 
 
 class Outcome(NamedTuple):
-    """What was seen with a Python."""
+    """The result of the tests with a Python."""
 
     interpreter: Interpreter
     set_up_s: float
@@ -61,26 +61,26 @@ def interpreters(named: str = "") -> list[Interpreter]:
     """Each supported Python once, oldest first: those named, else those of PATH, of the system and of pyenv."""
     path = [Path(folder) for folder in os.get_exec_path()]
     known = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
-    places = [
+    programs = [
         *(folder / f"python3.{minor}" for minor in MINORS for folder in path),
         Path("/usr/bin/python3"),
         *sorted(known.glob("*/bin/python3")),
     ]
     if named:
-        places = [Path(shutil.which(one) or one) for one in named.split()]
+        programs = [Path(shutil.which(name) or name) for name in named.split()]
     found: dict[Path, Interpreter] = {}
-    for place in places:
-        held = _probe(place) if place.is_file() else None
+    for program in programs:
+        held = _probe(program) if program.is_file() else None
         if held is None and named:
-            raise SystemExit(f"test-pythons: '{place}' is no Python that starts; correct PYTHONS")
+            raise SystemExit(f"test-pythons: '{program}' is no Python that starts; correct PYTHONS")
         if held is not None and held.minor in MINORS:
             found.setdefault(held.program, held)
-    return sorted(found.values(), key=lambda one: [int(n) for n in re.findall(r"\d+", one.version)])
+    return sorted(found.values(), key=lambda interpreter: [int(n) for n in re.findall(r"\d+", interpreter.version)])
 
 
-def _probe(place: Path) -> Interpreter | None:
+def _probe(path: Path) -> Interpreter | None:
     try:
-        done = subprocess.run([place, "-c", PROBE], capture_output=True, text=True, check=False, timeout=60)  # noqa: S603
+        done = subprocess.run([path, "-c", PROBE], capture_output=True, text=True, check=False, timeout=60)  # noqa: S603
     except (OSError, subprocess.TimeoutExpired):
         return None
     if done.returncode:
@@ -90,7 +90,7 @@ def _probe(place: Path) -> Interpreter | None:
 
 
 def tried(interpreter: Interpreter, tests: str, folder: Path) -> Outcome:
-    """Set-up, main job and tests in a clone; the clone is removed, the output kept.
+    """Set-up, main job and tests in a clone; the clone is removed, its output remains.
 
     tests : folders or files; empty for all
     folder : of the clone, and of a link to the data that lie beside a checkout
@@ -134,7 +134,7 @@ def table(rows: list[tuple[str, ...]]) -> str:
 
 
 def main() -> int:
-    """Try every Python; 1 where one is not good."""
+    """Try every Python; 1 where any fails."""
     found = interpreters(os.environ.get("PYTHONS", ""))
     if not found:
         sys.stderr.write(
@@ -143,17 +143,19 @@ def main() -> int:
         return 1
     LOGS.mkdir(parents=True, exist_ok=True)
     outcomes: list[Outcome] = []
-    for one in found:
-        sys.stdout.write(f"test-pythons: {one.version} ({one.program}); output in build/pythons/{one.version}.log\n")
+    for interpreter in found:
+        sys.stdout.write(
+            f"test-pythons: {interpreter.version} ({interpreter.program}); output in build/pythons/{interpreter.version}.log\n"
+        )
         sys.stdout.flush()
-        with tempfile.TemporaryDirectory(prefix="tumbleline-pythons-", ignore_cleanup_errors=True) as place:
+        with tempfile.TemporaryDirectory(prefix="tumbleline-pythons-", ignore_cleanup_errors=True) as folder:
             data = ROOT.parent / "shared"
             if data.is_dir():
-                (Path(place) / data.name).symlink_to(data)
-            outcomes.append(tried(one, os.environ.get("TESTS", ""), Path(place)))
+                (Path(folder) / data.name).symlink_to(data)
+            outcomes.append(tried(interpreter, os.environ.get("TESTS", ""), Path(folder)))
         sys.stdout.write(table([outcomes[-1].row()]) + "\n")
-    sys.stdout.write("\n" + table([one.row() for one in outcomes]) + "\n")
-    return 0 if all(one.good for one in outcomes) else 1
+    sys.stdout.write("\n" + table([outcome.row() for outcome in outcomes]) + "\n")
+    return 0 if all(outcome.good for outcome in outcomes) else 1
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """``python -m deploy.release [FOLDER]``: wheel, source distribution, bill of materials and hashes of a release.
 
-The wheel is built from the source distribution, in a folder of its own: a file that the source distribution lacks
+The wheel is built from the source distribution, in a separate folder: a file that the source distribution lacks
 is missing in the wheel, and files of an earlier build in ``build/`` do not get in. Nothing is fetched.
 """
 
@@ -25,12 +25,12 @@ def build(folder: Path, root: Path = ROOT) -> tuple[Path, Path]:
     root : the tree; it is copied, and stays as it is
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="tumbleline-release-") as place:
-        copy = Path(place) / "tree"
+    with tempfile.TemporaryDirectory(prefix="tumbleline-release-") as temporary:
+        copy = Path(temporary) / "tree"
         shutil.copytree(root, copy, ignore=lambda folder, names: _no_source(Path(folder) == root, names))
         source = folder / _run(copy, "build_sdist", folder)
-        unpack(source, Path(place))
-        wheel = folder / _run(Path(place) / source.name.removesuffix(".tar.gz"), "build_wheel", folder)
+        unpack(source, Path(temporary))
+        wheel = folder / _run(Path(temporary) / source.name.removesuffix(".tar.gz"), "build_wheel", folder)
     return wheel, source
 
 
@@ -73,7 +73,7 @@ def _run(tree: Path, hook: str, folder: Path) -> str:
     return done.stdout.strip().splitlines()[-1]
 
 
-def _no_source(top: bool, names: list[str]) -> set[str]:  # noqa: FBT001 - called in one place
+def _no_source(top: bool, names: list[str]) -> set[str]:  # noqa: FBT001 - called once
     """Names of a folder that belong to no release: environments, caches, archives, and what was built before."""
     hidden = {name for name in names if name.startswith(".") or name == "__pycache__" or name.endswith(".egg-info")}
     return hidden | ({"build", "dist", "archive", "tests", "benchmarks"} & set(names) if top else set())

@@ -31,7 +31,7 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
     for pin in pins(lock):
         locked.setdefault(pin.name, []).append(pin)
     name, version = project["name"], project["version"]
-    own = {
+    component = {
         "type": "application",
         "bom-ref": _reference(name, version),
         "name": name,
@@ -51,11 +51,11 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
         "version": 1,
         "metadata": {
             "timestamp": when.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
-            "component": own,
+            "component": component,
         },
         "components": [_component(pin) for pin in listed],
         "dependencies": [
-            {"ref": own["bom-ref"], "dependsOn": _references(project["dependencies"], locked)},
+            {"ref": component["bom-ref"], "dependsOn": _references(project["dependencies"], locked)},
             *({"ref": _reference(pin.name, pin.version), "dependsOn": _below(pin, locked)} for pin in listed),
         ],
     }
@@ -77,7 +77,7 @@ def _component(pin: Pin) -> dict[str, Any]:
         "scope": "optional" if pin.marker else "required",
         **({"licenses": [licence]} if licence else {}),
         "purl": _reference(pin.name, pin.version),
-        "properties": [*where, *({"name": "tumbleline:lock:sha256", "value": one} for one in pin.hashes)],
+        "properties": [*where, *({"name": "tumbleline:lock:sha256", "value": value} for value in pin.hashes)],
     }
 
 
@@ -101,7 +101,7 @@ def _below(pin: Pin, locked: dict[str, list[Pin]]) -> list[str]:
 
 def _references(requirements: Iterable[str], locked: dict[str, list[Pin]]) -> list[str]:
     """References of the requirements that hold on any Python of the locks: the bill is that of all of them."""
-    parsed = [Requirement(one) for one in requirements]
+    parsed = [Requirement(text) for text in requirements]
     environments = [{**on_linux(python), "extra": ""} for python in PYTHONS]
     needed = {
         canonicalize_name(r.name) for r in parsed if r.marker is None or any(map(r.marker.evaluate, environments))

@@ -31,7 +31,7 @@ KINDS = {
 
 
 class Weight(NamedTuple):
-    """What one part of the product installs: packages, their size without their own tests' compiled modules, and licences."""
+    """The installation of one part of the product: packages, their size without compiled modules of their tests, and licences."""
 
     part: str
     packages: tuple[str, ...]
@@ -55,15 +55,15 @@ def weights() -> list[Weight]:
 
 def closure(requirements: Iterable[str]) -> set[str]:
     """Normalised names of all packages that some requirements bring, on this Python; those that are missing are among them."""
-    parsed = [Requirement(one) for one in requirements]
-    below = needed_below((canonicalize_name(one.name), frozenset(one.extras)) for one in parsed)
-    return {canonicalize_name(one.name) for one in (*parsed, *(requirement for _, requirement in below))}
+    parsed = [Requirement(text) for text in requirements]
+    below = needed_below((canonicalize_name(requirement.name), frozenset(requirement.extras)) for requirement in parsed)
+    return {canonicalize_name(needed.name) for needed in (*parsed, *(requirement for _, requirement in below))}
 
 
 def kind_of(licence: str) -> str:
-    """The kind of an unusual licence; empty for one that asks for its notice only, and for a choice with such a one."""
+    """The kind of an unusual licence; empty for a licence that asks for its notice only, and for a choice that includes one."""
     both = re.split(r" AND ", licence)  # each part holds; names after a comma are a choice, as OR is
-    kinds = [[_kind(one) for one in re.split(r"\bOR\b|, ", part)] for part in both]
+    kinds = [[_kind(name) for name in re.split(r"\bOR\b|, ", part)] for part in both]
     return next((choice[0] for choice in kinds if all(choice)), "")
 
 
@@ -78,7 +78,7 @@ def _weight(part: str, packages: set[str]) -> Weight:
 
 @cache
 def megabytes(name: str) -> float:
-    """Size of the installed files of a package and of its compiled modules, those of its own tests left out, 10⁶ bytes."""
+    """Size of the installed files of a package and of its compiled modules, those of its tests left out, 10⁶ bytes."""
     held = installed(name)
     total = 0
     for file in (held.files or ()) if held is not None else ():
@@ -101,10 +101,10 @@ def _flat(requirements: Iterable[str], extras: dict[str, list[str]]) -> list[str
     """The requirements of an extra, with those of the extras of this product that it names."""
     flat: list[str] = []
     for text in requirements:
-        one = Requirement(text)
+        requirement = Requirement(text)
         flat += (
-            [deep for extra in one.extras for deep in _flat(extras[extra], extras)]
-            if one.name == "tumbleline"
+            [deep for extra in requirement.extras for deep in _flat(extras[extra], extras)]
+            if requirement.name == "tumbleline"
             else [text]
         )
     return flat
@@ -113,9 +113,9 @@ def _flat(requirements: Iterable[str], extras: dict[str, list[str]]) -> list[str
 def table() -> str:
     """The weights as a table of a document."""
     rows = ["| extra | packages | MB | licences that ask for more than their notice |", "|---|---|---|---|"]
-    for one in weights():
-        by_licence = ", ".join(f"{name}: {licence}" for name, licence in one.unusual.items()) or "–"
-        rows.append(f"| `{one.part}` | {len(one.packages)} | {one.megabytes:.0f} | {by_licence} |")
+    for weight in weights():
+        by_licence = ", ".join(f"{name}: {licence}" for name, licence in weight.unusual.items()) or "–"
+        rows.append(f"| `{weight.part}` | {len(weight.packages)} | {weight.megabytes:.0f} | {by_licence} |")
     return "\n".join(rows)
 
 

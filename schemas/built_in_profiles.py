@@ -17,7 +17,7 @@ def profile_names(folder: str) -> list[str]:
 
 
 def built_in_profile(folder: str, name: str, kind: type[Profile]) -> Profile:
-    """The profile of this name in a folder; :class:`RecipeInvalid` names close ones."""
+    """The profile of this name in a folder; :class:`RecipeInvalid` names similar profiles."""
     known = profile_names(folder)
     if name not in known:
         raise RecipeInvalid(

@@ -16,7 +16,7 @@ class ShareEntry(Entry):
 
 
 class Comparison(OnlyStated):
-    """What a comparison is worth.
+    """The uncertainty of a comparison.
 
     reference, drift : of the reference sensor · amplitude : ratio of the two channels · transverse : motion across the axis
     distortion : what distortion of the motion leaves in a fitted tone · mounting : relative motion of the two sensors
@@ -42,7 +42,7 @@ TERMS = tuple(Comparison.model_fields)
 
 
 class ExciterBand(Comparison):
-    """What an exciter is worth from one frequency to another, both in Hz."""
+    """The uncertainty of an exciter from one frequency to another, both in Hz."""
 
     from_hz: NotNegative
     to_hz: Positive

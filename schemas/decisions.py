@@ -117,9 +117,9 @@ def decide(
         return _decide_bound(limits, figure, value, median)
     guard = limits.guard_factor * standard_uncertainty
     expanded = limits.coverage_factor * standard_uncertainty
-    own = limits.figures[figure]
-    least = own.min is not None
-    limit = own.min or own.max or 0.0  # a limit has one of both
+    figure_limit = limits.figures[figure]
+    least = figure_limit.min is not None
+    limit = figure_limit.min or figure_limit.max or 0.0  # a limit has either of them
     if law is None:
         inner, outer = limit - guard, limit + guard
         risk = (below if least else outside)(value, standard_uncertainty, limit)
@@ -133,7 +133,7 @@ def decide(
         value=value,
         uncertainty=expanded,
         limit=limit,
-        unit=own.unit,
+        unit=figure_limit.unit,
         rule=rule,
         outcome=_outcome(-value, -limit, (-outer, -inner)) if least else _outcome(abs(value), limit, (inner, outer)),
         risk=risk,

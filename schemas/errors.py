@@ -77,7 +77,7 @@ class OperatorNeeded(StationError):
 
     @property
     def condition(self) -> str:
-        """What to correct, for a person who is asked at the station; there no command has to be given."""
+        """The condition to correct, for a person who is asked at the station, without the command."""
         return str(self)
 
 

@@ -65,12 +65,12 @@ class ExposureProfile(Strict):
 
     @property
     def by_unit(self) -> bool:
-        """Whether it needs a climate unit."""
+        """Whether the profile needs a climate unit."""
         return any(leg.by_unit for leg in self.legs)
 
     @property
     def conditioned(self) -> bool:
-        """Whether it sets more than a temperature."""
+        """Whether the profile sets more than temperatures."""
         return any(leg.humidity_pct is not None or leg.low_pressure for leg in self.legs)
 
     def levels(self) -> set[str]:
@@ -86,5 +86,5 @@ def exposure_profiles() -> list[str]:
 
 
 def load_exposure_profile(name: str) -> ExposureProfile:
-    """The built-in profile of this name; :class:`schemas.errors.RecipeInvalid` names close ones."""
+    """The built-in profile of this name; :class:`schemas.errors.RecipeInvalid` names similar profiles."""
     return built_in_profile(FOLDER, name, ExposureProfile)

@@ -43,7 +43,7 @@ class FaultOrder(Strict):
 
     @property
     def until_s(self) -> float:
-        """Its end; infinite for a permanent fault."""
+        """End of the fault, s; infinite for a permanent fault."""
         return math.inf if self.for_s is None else self.at_s + self.for_s
 
 

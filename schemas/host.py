@@ -43,7 +43,7 @@ def lock(file: int | IO[Any], way: int) -> None:
     handle = file if isinstance(file, int) else file.fileno()
     if _fcntl is not None:
         ways = ((SHARED, _fcntl.LOCK_SH), (EXCLUSIVE, _fcntl.LOCK_EX), (AT_ONCE, _fcntl.LOCK_NB))
-        _fcntl.flock(handle, sum(own for bit, own in ways if way & bit))
+        _fcntl.flock(handle, sum(flag for bit, flag in ways if way & bit))
     elif _msvcrt is not None:  # a shared lock is exclusive there
         try:
             _msvcrt.locking(handle, _msvcrt.LK_NBLCK if way & AT_ONCE else _msvcrt.LK_LOCK, 1)

@@ -44,18 +44,18 @@ class ImportReferences(Strict):
         return self
 
     def station(self) -> dict[str, Any]:
-        """As the station of a run that was captured."""
+        """The statements in the form of a captured run's station."""
         return {
             "name": self.name,
             "kind": "imported",
             "description": self.description,
             "pace": {"room_C": self.room_C},
-            "reference": [one.model_dump(mode="json") for one in self.reference],
+            "reference": [reference.model_dump(mode="json") for reference in self.reference],
             "uncertainty": self.uncertainty.model_dump(mode="json"),
         }
 
     def recipe(self) -> dict[str, Any]:
-        """As the keys of the recipe of a run that was captured."""
+        """The statements as keys of a captured run's recipe."""
         parts = {"stability": self.stability, "certificate": self.certificate}
         return {name: part.model_dump(mode="json") for name, part in parts.items() if part is not None}
 

@@ -37,7 +37,7 @@ def not_installed(problem: BaseException | None) -> str | None:
 
 
 def missing_in(log: str) -> str | None:
-    """The same for the output of a process of this environment; None where it names no missing library."""
+    """As :func:`not_installed`, for the output of a process of this environment; None where it names no missing library."""
     names = re.findall(r"^ModuleNotFoundError: No module named '([\w]+)", log, re.MULTILINE)
     return to_complete(names[-1], "is not installed") if names and names[-1] not in _OWN else None
 
@@ -53,8 +53,8 @@ def to_complete(library: str, found: str) -> str:
 
 
 def _is_of_installation(file: str) -> bool:
-    own = [_TREE / name for name in _OWN]
-    return bool(_libraries_of(file)) or any(Path(file).is_relative_to(folder) for folder in own)
+    folders = [_TREE / name for name in _OWN]
+    return bool(_libraries_of(file)) or any(Path(file).is_relative_to(folder) for folder in folders)
 
 
 def _libraries_of(file: str) -> tuple[str, ...]:

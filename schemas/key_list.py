@@ -53,15 +53,15 @@ def keys_of(model: type[BaseModel]) -> list[Key]:
     waiting: list[tuple[str, type[BaseModel]]] = [("", model)]
     listed: set[type[BaseModel]] = set()
     while waiting:
-        table, one = waiting.pop(0)
-        if one in listed:
+        table, table_model = waiting.pop(0)
+        if table_model in listed:
             continue
-        listed.add(one)
-        for name, field in one.model_fields.items():
+        listed.add(table_model)
+        for name, field in table_model.model_fields.items():
             below = models_in(field.annotation)
             default = "needed" if field.is_required() else _text(field.get_default(call_default_factory=True))
             value = _value(field.annotation)
-            keys.append(Key(table, name, value, default, meaning(one, name)))
+            keys.append(Key(table, name, value, default, meaning(table_model, name)))
             dotted = f"{table}.{name}" if table else name
             waiting += [(dotted, part) for part in below]
     return keys

@@ -32,7 +32,7 @@ class Pin(NamedTuple):
     """SHA-256 of the files of this version, of all systems and Pythons."""
 
     def holds(self, environment: Mapping[str, str] | None = None) -> bool:
-        """Whether it is installed in an environment, given by the markers that differ from those of this Python."""
+        """Whether the package is installed in an environment, given by the markers that differ from those of this Python."""
         return self.marker is None or self.marker.evaluate(dict(environment or {}))
 
 

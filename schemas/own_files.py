@@ -52,7 +52,7 @@ def own_file(kind: Kind, name: str, built_in: Iterable[str] = ()) -> Path | None
 
 
 def refuse_built_in_name(kind: Kind, name: str, path: Path, built_in: Iterable[str]) -> None:
-    """Refuse, as :class:`RecipeInvalid`, a file that would silently stand in the place of a built-in one of its name."""
+    """Refuse, as :class:`RecipeInvalid`, a file that would silently replace a built-in file of its name."""
     if name in built_in:
         raise RecipeInvalid(
             f"{kind}: '{name}' is built in, and {path} has the same name, one file per name is needed; rename {path}"
@@ -70,7 +70,7 @@ def contents(named: Iterable[tuple[Kind, str]]) -> dict[str, str]:
 
 
 def report_to(listener: Callable[[str], None]) -> None:
-    """Call ``listener``, and no earlier one, with one line for each file of the user that is used, at its first use."""
+    """Call ``listener``, instead of any earlier one, with a line for each file of the user that is used, at its first use."""
     _listeners[:] = [listener]
     _reported.clear()
 

@@ -63,11 +63,11 @@ class Register(Strict):
 
     @property
     def writable(self) -> bool:
-        """Whether it may be written at all."""
+        """Whether the register may be written."""
         return self.access != "read"
 
     def with_decimals(self, decimals: int) -> "Register":
-        """The same register, its values in steps of ten to the power of minus ``decimals``."""
+        """The register with its values in steps of ten to the power of minus ``decimals``."""
         return self.model_copy(update={"scale": self.scale * 10.0**-decimals, "scaled_by": ""})
 
     @property
@@ -120,7 +120,7 @@ class Command(Strict):
 
     @property
     def writable(self) -> bool:
-        """Whether it may be set."""
+        """Whether the command may be set."""
         return bool(self.tell)
 
 
@@ -189,11 +189,11 @@ class Profile(Strict):
         return self
 
     def register(self, name: str) -> Register:
-        """The register of that name; an unknown one is refused with what looks like it."""
+        """The register of that name; an unknown name is refused, with similar names."""
         return self._named(name, "register", self.registers)
 
     def command(self, name: str) -> Command:
-        """The command of that name; an unknown one is refused with what looks like it."""
+        """The command of that name; an unknown name is refused, with similar names."""
         return self._named(name, "command", self.commands)
 
     def _named(self, name: str, what: str, entries: Sequence[AnyEntry]) -> AnyEntry:
@@ -226,8 +226,8 @@ class Profile(Strict):
                     key="maximum",
                 )
 
-        def least(name: str, own: float | None) -> dict[str, float]:
-            return {"maximum": min(maximum[name], math.inf if own is None else own)} if name in maximum else {}
+        def least(name: str, stated: float | None) -> dict[str, float]:
+            return {"maximum": min(maximum[name], math.inf if stated is None else stated)} if name in maximum else {}
 
         motion = Motion(**{name: value for name, value in maximum.items() if name in moving})
         return self.model_copy(

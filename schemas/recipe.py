@@ -116,8 +116,8 @@ class _Measurement(Grown):
         parts = given["soaks"]
         if not isinstance(parts, list) or not all(isinstance(s, dict | SoakPart) for s in parts):
             return given  # the field itself says what is wrong
-        own = [s.get("temperature_C") if isinstance(s, dict) else s.temperature_C for s in parts]
-        return {**given, "temperatures_C": own}
+        temperatures = [s.get("temperature_C") if isinstance(s, dict) else s.temperature_C for s in parts]
+        return {**given, "temperatures_C": temperatures}
 
     @model_validator(mode="after")
     def _usable(self) -> "_Measurement":
@@ -165,7 +165,7 @@ class _Measurement(Grown):
     @field_validator("procedures", mode="before")
     @classmethod
     def _each_in_a_table(cls, values: Any) -> Any:
-        if isinstance(values, list) and (names := [one for one in values if isinstance(one, str)]):
+        if isinstance(values, list) and (names := [value for value in values if isinstance(value, str)]):
             raise ValueError(
                 f"'{shown(names[0])}' is a name, a table for each procedure is needed; write [[procedures]], and below it "
                 f'kind = "{shown(names[0])}"'

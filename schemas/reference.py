@@ -48,7 +48,7 @@ class Reference(Grown):
         return self
 
     def standard(self, unit: str) -> float | None:
-        """Standard uncertainty in rad, K, … where the certificate states it in a unit of the same kind; else None."""
+        """Standard uncertainty in rad, K, … where the certificate's unit can be converted to it; else None."""
         if self.U is None or self.k is None or self.unit is None or not unit:
             return None
         kinds = ({"urad", "arcsec", "deg"}, {"ppm", "percent"}, {"ug", "g"})

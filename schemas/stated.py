@@ -37,7 +37,7 @@ class StandardUncertainty(NamedTuple):
 class Entry(OnlyStated):
     """One entry of the budget.
 
-    rectangular : key of a half-width whose distribution is rectangular unless another one is stated; empty for none
+    rectangular : key of a half-width whose distribution is rectangular unless another distribution is stated; empty for none
     exact : what the entry does not state, or states as 0, is exactly 0; without this word a 0 counts as not stated
     """
 
@@ -53,8 +53,8 @@ class Entry(OnlyStated):
 
     def standard(self, part: str = "") -> StandardUncertainty:
         """The standard uncertainty of a part of the entry; 0 where the entry is exact or the part is not stated."""
-        for name, own, form, unit in _forms(self):
-            if own == part:
+        for name, name_of_part, form, unit in _forms(self):
+            if name_of_part == part:
                 return self._converted(form, unit, float(getattr(self, name)))
         return StandardUncertainty(0.0, "", 0.0, "normal", 1.0)
 
@@ -106,7 +106,7 @@ class Entry(OnlyStated):
 
     @property
     def origin(self) -> str:
-        """Where the figure comes from, if from no reference standard."""
+        """Origin of a figure that comes from no reference standard."""
         return self.source
 
 
@@ -114,7 +114,7 @@ def _forms(entry: Entry) -> list[tuple[str, str, str, str]]:
     """(key, part, form, unit) of the uncertainties that an entry states."""
     matches = (STATED.match(name) for name in type(entry).model_fields)
     stated = ((m[0], m["part"] or "", m["form"], m["unit"]) for m in matches if m and m["unit"] in TO_SI)
-    return [one for one in stated if getattr(entry, one[0]) is not None]
+    return [form for form in stated if getattr(entry, form[0]) is not None]
 
 
 Stated = NotNegative | None

@@ -136,9 +136,9 @@ class StationConfig(Grown):
         if self.kind == "modbus":
             addressed = {f"devices.{name}": getattr(self.devices, name) for name in Devices.model_fields}
             addressed |= {f"equipment.{role}": device for role, device in self.equipment.there().items()}
-            for place, device in addressed.items():
+            for key, device in addressed.items():
                 if missing := device.missing():
-                    raise ValueError(f"{place}.{missing}: empty, a station of kind modbus needs one; add it")
+                    raise ValueError(f"{key}.{missing}: empty, a station of kind modbus needs one; add it")
             supply = self.equipment.power_supply
             if supply is not None and "voltage" not in supply.maximum:
                 raise ValueError(
@@ -163,17 +163,17 @@ def refuse_untraced(stated: Uncertainty, references: Sequence[Reference], *, sim
             raise ValueError(
                 f"uncertainty.{name}.reference: no [[reference]] is called '{entry.reference}' (there are: {named}); add it"
             )
-        own, claimed = known[entry.reference], entry.standard("offset" if name == "thermometer" else "")
-        least = own.standard(claimed.unit)
+        source, claimed = known[entry.reference], entry.standard("offset" if name == "thermometer" else "")
+        least = source.standard(claimed.unit)
         if least is not None and claimed.unit and least > claimed.u * (1.0 + 1e-9):
             raise ValueError(
-                f"uncertainty.{name}: u = {claimed.u / TO_SI[claimed.unit]:.3g} {claimed.unit}, reference {own.id} has "
+                f"uncertainty.{name}: u = {claimed.u / TO_SI[claimed.unit]:.3g} {claimed.unit}, reference {source.id} has "
                 f"{least / TO_SI[claimed.unit]:.3g} {claimed.unit}; state at least that"
             )
 
 
 def with_faults(config: StationConfig, faults: Sequence[FaultOrder]) -> StationConfig:
-    """The station with faults beyond its file's; a station of hardware has trouble enough of its own."""
+    """The station with faults beyond its file's; :class:`WrongUse` for a station of hardware."""
     if not faults:
         return config
     if config.kind != "simulated" or config.simulation is None:

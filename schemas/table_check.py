@@ -1,4 +1,4 @@
-"""The check of a table against its contract: the table with the right types, or one message with row, value and requirement."""
+"""The check of a table against its contract: the table with the right types, or a message with row, value and requirement."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ def _refuse_not_finite(table: Table, frame: pd.DataFrame, source: str) -> None:
     for column in table.finite:
         if column not in rows.columns:
             continue
-        own = rows[column]
-        plain = own.dtype == np.float64  # others are converted first, which is slower
-        values = own.to_numpy() if plain else np.asarray(pd.to_numeric(own, errors="coerce"), dtype=float)
+        found = rows[column]
+        plain = found.dtype == np.float64  # others are converted first, which is slower
+        values = found.to_numpy() if plain else np.asarray(pd.to_numeric(found, errors="coerce"), dtype=float)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             index = rows.index[bad[0]]
@@ -155,11 +155,11 @@ def all_different(columns: Sequence[Seen]) -> bool:
     """Whether all rows differ in at least one of these columns; false, too, where there are too many values to decide."""
     combined, count = np.zeros(1, dtype=np.int64), 1
     for column in columns:
-        codes, own = _codes_of(column)
-        count *= own
+        codes, kinds = _codes_of(column)
+        count *= kinds
         if count > DIFFERENT:
             return False
-        combined = combined * own + codes
+        combined = combined * kinds + codes
     return not columns or np.unique(combined).size == combined.size
 
 

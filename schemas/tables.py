@@ -40,7 +40,7 @@ class Column:
     missing: bool = False
 
     def contract(self) -> pa.Column:
-        """The same as a column of the library that explains what is wrong."""
+        """The column in the form of the library that explains violations."""
         import pandera.pandas as pa  # noqa: PLC0415 - a table without an error does not need it
 
         checks = [pa.Check.ge(self.low)] if self.low is not None else []
@@ -83,12 +83,12 @@ class Table:
 
 
 def each(column: Column, *names: str) -> dict[str, Column]:
-    """The same column under several names."""
+    """A column under each of several names."""
     return dict.fromkeys(names, column)
 
 
 def text(*allowed: str) -> Column:
-    """A text: one of the allowed ones, or any that is not empty."""
+    """A text: one of the allowed texts, or any that is not empty."""
     return Column("str", allowed=allowed, filled=not allowed)
 
 
@@ -110,7 +110,7 @@ _UNIT, _AXIS = each(text(), "unit"), each(text(*AXES), "axis")
 _RECORD = {**_UNIT, **each(WHOLE, "slot", "record"), "kind": text(*KINDS)}
 
 TABLES: dict[str, Table] = {
-    # Samples may hold NaN: what a device really sent is kept, and the validate stage refuses the unit.
+    # Samples may hold NaN: what a device really sent is stored, and the validate stage refuses the unit.
     "samples": Table({**_RECORD, "time_s": NUMBER, **each(GAPS, *AXES)}),
     "readings": Table(
         {
@@ -193,7 +193,7 @@ TABLES: dict[str, Table] = {
         },
         key=("unit", "axis"),
     ),
-    # of the coefficients, from earlier calibrations of the family; no rows without one
+    # of the coefficients, from earlier calibrations of the family; no rows without a prior
     "prior": Table(
         {
             **_UNIT,

@@ -63,10 +63,10 @@ def parse_as(kind: type[AnyModel], text: str, source: str, context: Any = None) 
 
 
 def _depth(content: Any) -> int:
-    """How deep lists and tables lie in one another, found without going down into them one by one."""
+    """How deep lists and tables lie in one another, found level by level, without recursion."""
     level, depth = [content], 0
     while level and depth <= DEEPEST:
-        inner = [v for one in level for v in (one.values() if isinstance(one, dict) else one)]
+        inner = [v for part in level for v in (part.values() if isinstance(part, dict) else part)]
         level, depth = [v for v in inner if isinstance(v, dict | list)], depth + 1
     return depth
 
@@ -89,8 +89,8 @@ def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> Re
         message = f"{source}: unknown key '{key}'; {did_you_mean(wrong, known)}"
         return RecipeInvalid(message, key=key, close=close_matches(wrong, known))
     numbers = [part for part in first["loc"] if isinstance(part, int)]
-    place = f", number {numbers[0] + 1}" if numbers and first["loc"][0] == "poses" else ""
-    return RecipeInvalid(f"{source}: {_sentence(first, key, place)}", key=key)
+    entry = f", number {numbers[0] + 1}" if numbers and first["loc"][0] == "poses" else ""
+    return RecipeInvalid(f"{source}: {_sentence(first, key, entry)}", key=key)
 
 
 def _is_branch(part: object) -> bool:
@@ -98,7 +98,7 @@ def _is_branch(part: object) -> bool:
     return isinstance(part, str) and (part == "str" or "[" in part)
 
 
-def _sentence(detail: ErrorDetails, key: str, place: str) -> str:
+def _sentence(detail: ErrorDetails, key: str, entry: str) -> str:
     if detail["type"] == "missing":
         return f"key '{key}' is missing; add it"
     reason = shown(reason_of(detail), LONGEST_REASON)
@@ -106,9 +106,9 @@ def _sentence(detail: ErrorDetails, key: str, place: str) -> str:
         return reason
     value = detail["input"]
     if isinstance(value, dict) or (isinstance(value, list) and (value or detail["type"] == "value_error")):
-        return f"key '{key}'{place}: {reason}"
+        return f"key '{key}'{entry}: {reason}"
     text = f"'{shown(value)}'" if isinstance(value, str) else shown(value)
-    return f"key '{key}'{place}: found {text}: {reason[:1].lower()}{reason[1:]}"
+    return f"key '{key}'{entry}: found {text}: {reason[:1].lower()}{reason[1:]}"
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:

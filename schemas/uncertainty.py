@@ -70,7 +70,7 @@ class Gravity(RelativeEntry):
         return standard
 
     def states(self, part: str = "") -> bool:
-        """Whether it has an uncertainty, that of the formula where none is stated, or is said to be exact."""
+        """Whether the entry has an uncertainty, that of the formula where none is stated, or is said to be exact."""
         return self.exact or self.relative().u > 0.0
 
     @property
@@ -133,7 +133,7 @@ class Settling(Entry):
     scope: Scope = "run"
 
     def states(self, part: str = "") -> bool:
-        """By its time constants."""
+        """Whether the entry is stated, by its time constants."""
         return True
 
     @property
@@ -220,15 +220,19 @@ class Uncertainty(Strict):
         compared: dict[str, Comparison] = {f"exciter[{number}]": band for number, band in enumerate(self.exciter)}
         if self.shock_machine is not None:
             compared["shock_machine"] = self.shock_machine
-        own = {f"{path}.{name}": entry for path, one in compared.items() for name, entry in one.entries.items()}
-        return {**self.entries, **own}
+        by_path = {
+            f"{path}.{name}": entry
+            for path, comparison in compared.items()
+            for name, entry in comparison.entries.items()
+        }
+        return {**self.entries, **by_path}
 
     def comparison(self, role: str, frequency_hz: float) -> Comparison | None:
-        """What is stated of the equipment of a role at a frequency; NaN: a result of no one frequency, the first statement."""
+        """What is stated of the equipment of a role at a frequency; the first one for NaN (no single frequency)."""
         if role != "exciter":
             return self.shock_machine if role == "shock_machine" else None
         anywhere = math.isnan(frequency_hz)
-        return next((one for one in self.exciter if anywhere or one.from_hz <= frequency_hz <= one.to_hz), None)
+        return next((band for band in self.exciter if anywhere or band.from_hz <= frequency_hz <= band.to_hz), None)
 
     @property
     def not_stated(self) -> dict[str, str]:

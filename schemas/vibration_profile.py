@@ -35,5 +35,5 @@ def vibration_profiles() -> list[str]:
 
 
 def load_vibration_profile(name: str) -> VibrationProfile:
-    """The built-in profile of this name; :class:`schemas.errors.RecipeInvalid` names close ones."""
+    """The built-in profile of this name; :class:`schemas.errors.RecipeInvalid` names similar profiles."""
     return built_in_profile("vibration", name, VibrationProfile)

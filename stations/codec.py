@@ -45,7 +45,7 @@ def encode(register: Register, order: WordOrder, value: Value) -> list[int]:
         raise NotEncodable(
             f"{register.name}: {len(values)} values, {register.count} are needed; give one value for each"
         )
-    return [word for one in values for word in _encode_number(register, order, one)]
+    return [word for number in values for word in _encode_number(register, order, number)]
 
 
 def decode(register: Register, order: WordOrder, words: Sequence[int]) -> Value:
@@ -144,9 +144,9 @@ def unpack_samples(words: Words, packing: Packing) -> tuple[Counts, Counts]:
     table = words.reshape(-1, WORDS_PER_SAMPLE[packing])
     sign = 1 << (BITS[packing] - 1)
     if packing == "int20x3":
-        one, two, three, four = table.T.astype(np.int64)
-        axes = (one << 4 | two >> 12, (two & 0xFFF) << 8 | three >> 8, (three & 0xFF) << 12 | four >> 4)
-        counts, number = np.stack(axes, axis=-1), four & 0xF
+        first, second, third, fourth = table.T.astype(np.int64)
+        axes = (first << 4 | second >> 12, (second & 0xFFF) << 8 | third >> 8, (third & 0xFF) << 12 | fourth >> 4)
+        counts, number = np.stack(axes, axis=-1), fourth & 0xF
     else:
         m, data = OUTPUTS[packing], table.astype(">u2").view(np.uint8).astype(np.int64)
         high, middle, low = np.moveaxis(data[:, : 3 * m].reshape(-1, m, 3), -1, 0)

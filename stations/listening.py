@@ -1,4 +1,4 @@
-"""A TCP server in a thread of its own, for devices that are simulated or replayed."""
+"""A TCP server in a separate thread, for devices that are simulated or replayed."""
 
 import socketserver
 import threading

@@ -1,4 +1,4 @@
-"""Opening a station: links, profiles and adapters put together; the one place that knows simulation from hardware."""
+"""Opening a station: links, profiles and adapters put together; here alone simulation is told from hardware."""
 
 from __future__ import annotations
 
@@ -181,15 +181,15 @@ def _assemble(
     return Station(config, clock, *parts, safe_steps=steps, equipment=equipment)
 
 
-def _values(name: str, place: str, device: Device, links: Links) -> Values:
+def _values(name: str, key: str, device: Device, links: Links) -> Values:
     """Values of a device: text commands on a link for lines, registers on any other."""
     if device.link in TEXT_CARRIERS:
-        return Commands(name, links.lines(place), profile_of(device))
-    return _registers(name, place, device, links)
+        return Commands(name, links.lines(key), profile_of(device))
+    return _registers(name, key, device, links)
 
 
-def _registers(name: str, place: str, device: Device, links: Links) -> Registers:
-    return Registers(name, links.registers(place), device.device_id, profile_of(device))
+def _registers(name: str, key: str, device: Device, links: Links) -> Registers:
+    return Registers(name, links.registers(key), device.device_id, profile_of(device))
 
 
 def _axis(
@@ -201,20 +201,20 @@ def _axis(
         tighter((0.0, wanted), profile, name if profile.has(name) else f"{which}_{name}")[1]
         for name, wanted in (("speed", limits.speed_deg_s), ("acceleration", limits.acceleration_deg_s2))
     )
-    kept = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
-    return adapter_of(profile, "axis", TableAxis)(registers, tighter(bounds, profile, "target"), kept, which)
+    allowed = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
+    return adapter_of(profile, "axis", TableAxis)(registers, tighter(bounds, profile, "target"), allowed, which)
 
 
 def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[float, float]:
     """The bounds that both the station's file and a value of the profile allow."""
     if not profile.has(name):
         return bounds
-    own = profile.entry(name)
-    low, high = limits_of(own)
+    entry = profile.entry(name)
+    low, high = limits_of(entry)
     low, high = max(bounds[0], low), min(bounds[1], high)
     if low >= high:
         raise RecipeInvalid(
-            f"profile {profile.name}: {name} from {own.minimum} to {own.maximum} {own.unit}, the station's limits are "
+            f"profile {profile.name}: {name} from {entry.minimum} to {entry.maximum} {entry.unit}, the station's limits are "
             f"{bounds[0]:g} to {bounds[1]:g}: nothing is allowed by both; correct [limits] in the station's file",
             key="limits",
         )
@@ -246,9 +246,9 @@ def _claimed(stack: ExitStack) -> int | None:
     if not hasattr(os, "sched_setaffinity") or len(allowed := os.sched_getaffinity(0)) < 2:
         return None
     for number in sorted(allowed):
-        place = Path(tempfile.gettempdir()) / _NAME.format(user=os.getuid(), number=number)
+        path = Path(tempfile.gettempdir()) / _NAME.format(user=os.getuid(), number=number)
         try:
-            file = os.open(place, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+            file = os.open(path, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
         except OSError:
             return None
         try:

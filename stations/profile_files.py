@@ -29,8 +29,8 @@ def profile_of(device: Carried) -> Profile:
 
 def in_order(profile: Profile, order: WordOrder) -> Profile:
     """A profile with a word order for all its registers."""
-    kept = [register.model_copy(update={"word_order": None}) for register in profile.registers]
-    return profile.model_copy(update={"word_order": order, "registers": kept})
+    registers = [register.model_copy(update={"word_order": None}) for register in profile.registers]
+    return profile.model_copy(update={"word_order": order, "registers": registers})
 
 
 def recorded_columns(reader: Carried) -> list[str]:

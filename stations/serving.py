@@ -34,10 +34,10 @@ NAMES = (("outer axis", "outer"), ("inner axis", "inner"), ("chamber", "chamber"
 
 @dataclass(frozen=True)
 class Served:
-    """Address and profile of a device of a station; ``place`` is its name in the station file."""
+    """Address and profile of a device of a station; ``key`` is its name in the station file."""
 
     name: str
-    place: str
+    key: str
     device_id: int
     profile: str
     host: str = ""
@@ -61,9 +61,9 @@ def served(config: StationConfig, slots: list[int]) -> list[Served]:
     """Every device of a station, with the slots of these numbers."""
     devices = config.devices
     shared = [
-        Served(name, place, device.device_id, device.profile, device.host, device.port)
-        for name, place in NAMES
-        if (device := getattr(devices, place))
+        Served(name, key, device.device_id, device.profile, device.host, device.port)
+        for name, key in NAMES
+        if (device := getattr(devices, key))
     ]
     s = devices.slots
     return shared + [Served(f"slot {i}", "slots", s.device_id + i, s.profile, s.host, s.port) for i in slots]
@@ -113,17 +113,17 @@ def _listening(plant: Plant, host: str, port: int, stack: ExitStack) -> PlantSer
     from stations.plant.server import PlantServer, serve_lines  # noqa: PLC0415
 
     for attempt in range(TRIES):
-        with ExitStack() as own:
+        with ExitStack() as servers:
             begin = _free_port_pair(host) if plant.line_devices and port == 0 else port
             try:
-                server = own.enter_context(PlantServer(plant, host, begin))
+                server = servers.enter_context(PlantServer(plant, host, begin))
                 for number, device_id in enumerate(plant.line_devices, server.port + 1):
-                    own.enter_context(serve_lines(plant, device_id, host, number))
+                    servers.enter_context(serve_lines(plant, device_id, host, number))
             except StationRefused:
                 if port != 0 or attempt == TRIES - 1:
                     raise
                 continue
-            stack.enter_context(own.pop_all())
+            stack.enter_context(servers.pop_all())
             return server
     raise StationRefused(f"simulated station: {host} has no free port, one is needed; end other programs")
 
@@ -169,13 +169,13 @@ def _look(config: StationConfig, links: Links) -> Iterator[RegisterReading]:
 
 def _values(links: Links, device: Served) -> Iterator[RegisterReading]:
     """Values of one device; after the first request without an answer its other registers are not read."""
-    profile = profile_of(getattr(links.config.devices, device.place))
+    profile = profile_of(getattr(links.config.devices, device.key))
     asked: list[tuple[Register | Command, int, Callable[[], str]]]
     if profile.commands:
-        commands = Commands(device.name, links.lines(device.place), profile)
+        commands = Commands(device.name, links.lines(device.key), profile)
         asked = [(c, number, partial(commands.text, c.name)) for number, c in enumerate(profile.commands)]
     else:
-        registers = Registers(device.name, links.registers(device.place), device.device_id, profile)
+        registers = Registers(device.name, links.registers(device.key), device.device_id, profile)
         readable = [r for r in profile.registers if r.access != "write"]
         asked = [(r, r.address, partial(_shown, registers, r)) for r in readable]
     for entry, address, read in asked:

@@ -1,4 +1,4 @@
-"""The watchdog of a run: a process of its own that puts the station into its safe state when the run is gone.
+"""The watchdog of a run: a separate process that puts the station into its safe state when the run is gone.
 
 Its standard input gives it the station, then a message with each heartbeat, and a last message when the station is safe. The run
 is gone when that pipe ends without the last message, when the run's process is no longer its parent, or after ``lapse_s`` without

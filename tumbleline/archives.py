@@ -63,9 +63,12 @@ class ArchiveView:
 
         day = day_of(at, "at")
         history = Ledger(self.store).calibrations(unit, day_of(known, "known") if known else "")
-        valid = next((one for one in history if one.holds(day)), None)
+        valid = next((calibration for calibration in history if calibration.holds(day)), None)
         if valid is None:
-            there = "; ".join(f"{one.certificate} from {one.start} until {one.until}, {one.state}" for one in history)
+            there = "; ".join(
+                f"{calibration.certificate} from {calibration.start} until {calibration.until}, {calibration.state}"
+                for calibration in history
+            )
             raise WrongUse(f"coefficients: no calibration of unit {unit} is valid on {day} ({there or 'it has none'})")
         rows = pd.DataFrame(coefficients_of(self.store.run(valid.run), valid))
         return rows.assign(U=K * rows["standard_error"].astype(float), certificate=valid.certificate, run=valid.run)
@@ -83,7 +86,7 @@ class ArchiveView:
 
         document = discovered(self.store, Look(device=device)).document
         rows = [*document["discoveries"], *document["unexplained"]]
-        kept = (
+        columns = (
             "id",
             "since",
             "recommended",
@@ -96,7 +99,7 @@ class ArchiveView:
             "effects",
             "drivers",
         )
-        return pd.DataFrame([{name: row.get(name) for name in kept} for row in rows], columns=list(kept))
+        return pd.DataFrame([{name: row.get(name) for name in columns} for row in rows], columns=list(columns))
 
     def plot(self, unit: str, effect: str = "bias") -> Picture:
         """Change of a unit's coefficients of an effect since they were measured first, with U (k = 2) as bars, by day."""
@@ -114,9 +117,10 @@ class ArchiveView:
         )
         rows = rows.assign(day=days.astype(float) / 86400.0)
         traces = tuple(
-            Trace(f"{axis} {name}", own["day"].to_numpy(dtype=float), (own["value"] - own["value"].iloc[0]).to_numpy(dtype=float),
-                  role=role, error=own["U"].to_numpy(dtype=float))
-            for role, ((axis, name), own) in zip(SEVERAL, rows.groupby(["axis", "name"]), strict=False)
+            Trace(f"{axis} {name}", of_term["day"].to_numpy(dtype=float),
+                  (of_term["value"] - of_term["value"].iloc[0]).to_numpy(dtype=float),
+                  role=role, error=of_term["U"].to_numpy(dtype=float))
+            for role, ((axis, name), of_term) in zip(SEVERAL, rows.groupby(["axis", "name"]), strict=False)
         )  # fmt: skip
         title, value = f"{effect} of {unit}", f"change since the first / {rows['unit_text'].iloc[0]}"
         return Picture(Chart(title, (Plot(title, PlotAxis("measured", dates=True), PlotAxis(value), traces),)))

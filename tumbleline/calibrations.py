@@ -83,9 +83,9 @@ class Calibration:
             table = table.assign(unit_C=temperature)
         rate = 1.0 if rate_hz is None and "time_s" not in table else rate_hz
         use_formulas_of(self.run)
-        one = fit_of_unit(self.run, unit, failed=True, revoked=False)
+        fit = fit_of_unit(self.run, unit, failed=True, revoked=False)
         recording = recording_of(table, "samples", rate_hz=rate)
-        return table_of(recording, corrected(recording, one, None))
+        return table_of(recording, corrected(recording, fit, None))
 
     def export(self, form: str = "json", output: str | Path | None = None, **settings: Any) -> str | bytes:
         """The coefficients for firmware, autopilots and spreadsheets.
@@ -128,8 +128,13 @@ class Calibration:
         rows = self.residuals
         rows = rows[rows["unit"] == rows["unit"].iloc[0]]
         traces = tuple(
-            Trace(str(axis), own["dwell"].to_numpy(dtype=float), own["residual_ug"].to_numpy(dtype=float), role=role)
-            for role, (axis, own) in zip(SEVERAL, rows.groupby("axis", sort=True), strict=False)
+            Trace(
+                str(axis),
+                of_axis["dwell"].to_numpy(dtype=float),
+                of_axis["residual_ug"].to_numpy(dtype=float),
+                role=role,
+            )
+            for role, (axis, of_axis) in zip(SEVERAL, rows.groupby("axis", sort=True), strict=False)
         )
         title = f"Residuals of {rows['unit'].iloc[0]}"
         return Picture(Chart(title, (Plot(title, PlotAxis("dwell"), PlotAxis("residual / µg"), traces),)))

@@ -58,7 +58,7 @@ class ModelDiagnosis(JudgedModel):
 
     @property
     def missing(self) -> pd.DataFrame:
-        """One row per class of effects that these data cannot separate: what is missing, first the one that is proposed.
+        """One row per class of effects that these data cannot separate: what is missing, the proposed effect first.
 
         ``size_ug``: of the effect; ``p_value``: of noise alone; ``rms_after_ug``, ``heldout_after_ug``: residual with it, of the
         dwells that are fitted and of dwells left out.
@@ -159,5 +159,7 @@ def effects() -> pd.DataFrame:
     from inertial.effects import catalogue
 
     columns = ("symbol", "equation", "scope", "breaker")
-    rows = [{"id": name, **{column: getattr(one, column) for column in columns}} for name, one in catalogue().items()]
+    rows = [
+        {"id": name, **{column: getattr(effect, column) for column in columns}} for name, effect in catalogue().items()
+    ]
     return pd.DataFrame(rows)

@@ -37,7 +37,7 @@ class ImprovedModel(JudgedModel):
     def undecided(self) -> list[list[str]]:
         """Classes of effects that these data do not separate: none was added; name one with ``effect=``."""
         open_ = [choice for choice in self.document["choices"] if choice["decided_by"] == "undecided"]
-        return [[one["effect"], *one["not_separated_from"]] for one in open_]
+        return [[choice["effect"], *choice["not_separated_from"]] for choice in open_]
 
     @property
     def ladder(self) -> pd.DataFrame:
@@ -92,7 +92,7 @@ def improve(
     effects : the model to begin with; None: the default model
     effect : effects to add, one per class of the diagnosis; none: each that is alone in its class
     fresh : the same units measured again; it judges the change
-    model_file : file to write, with the history of the model; None: none is kept
+    model_file : file to write, with the history of the model; None: no file is written
     """
     given = recording if isinstance(recording, Recording) else read(recording)
     again = None if fresh is None else fresh if isinstance(fresh, Recording) else read(fresh)

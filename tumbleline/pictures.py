@@ -70,5 +70,5 @@ def as_html(title: str, lines: list[str], *tables: pd.DataFrame, picture: Pictur
 
 
 def as_text(title: str, lines: list[str], *tables: pd.DataFrame) -> str:
-    """The same as text."""
+    """The picture as text."""
     return "\n".join([title, *lines, *(table.to_string(index=False, **_SHORT) for table in tables if len(table))])

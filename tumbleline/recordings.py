@@ -38,7 +38,7 @@ class Recording:
     """Dwells of one or several units, and how they came about.
 
     run : that holds them, in the archive that was named, else in one of this process
-    told : what was recognised, assumed and left out, as sentences · command : the import that says the same; empty for dwells
+    told : what was recognised, assumed and left out, as sentences · command : the equivalent import; empty for dwells
     """
 
     run: Run = field(repr=False)
@@ -74,13 +74,13 @@ class Recording:
         from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
 
         dwells = self.dwells
-        own = dwells[dwells["unit"] == dwells["unit"].iloc[0]]
-        names = [name for name in ("out_x", "out_y", "out_z") if name in own]
-        unit = str(own["out_unit"].iloc[0]) if "out_unit" in own else ""
-        x = own["dwell"].to_numpy(dtype=float)
+        rows = dwells[dwells["unit"] == dwells["unit"].iloc[0]]
+        names = [name for name in ("out_x", "out_y", "out_z") if name in rows]
+        unit = str(rows["out_unit"].iloc[0]) if "out_unit" in rows else ""
+        x = rows["dwell"].to_numpy(dtype=float)
         roles: dict[str, Role] = {"x": "x", "y": "y", "z": "z"}
-        traces = tuple(Trace(name[-1], x, own[name].to_numpy(dtype=float), role=roles[name[-1]]) for name in names)
-        title = f"Outputs of {own['unit'].iloc[0]}"
+        traces = tuple(Trace(name[-1], x, rows[name].to_numpy(dtype=float), role=roles[name[-1]]) for name in names)
+        title = f"Outputs of {rows['unit'].iloc[0]}"
         return Picture(Chart(title, (Plot(title, PlotAxis("dwell"), PlotAxis(f"output / {unit}"), traces),)))
 
     def _lines(self) -> list[str]:
@@ -129,12 +129,12 @@ def read(
     if isinstance(source, pd.DataFrame):
         if is_exchange(source.columns) and not columns:
             past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
-            return _kept(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive, units)
+            return _stored(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive, units)
         return replace(_imported([_as_file(source)], columns, units, serial or "A", archive, stated), command="")
     from pipelines.importers import files
 
     if not isinstance(source, str | Path):
-        return _imported([Path(one) for one in source], columns, units, serial, archive, stated)
+        return _imported([Path(path) for path in source], columns, units, serial, archive, stated)
     if not files.is_file(str(source)):
         return Recording(Archive(None if archive is None else str(archive)).run(str(source)))
     path = Path(source)
@@ -144,11 +144,11 @@ def read(
         beside = history if isinstance(history, str | Path) else ""
         dwells, past, _ = dwells_and_history(str(path), str(beside), None)
         past = checked_history(history, "history", foreign=True) if isinstance(history, pd.DataFrame) else past
-        return _kept(dwells, past, path.name, archive, units)
+        return _stored(dwells, past, path.name, archive, units)
     return _imported([path], columns, units, serial, archive, stated)
 
 
-def _kept(
+def _stored(
     dwells: pd.DataFrame,
     history: pd.DataFrame | None,
     name: str,
@@ -159,10 +159,10 @@ def _kept(
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
     dwells, told = complete_table(dwells, (units or {}).get("output", ""))
-    return Recording(keep_table_of_dwells(dwells, history, name, _place(archive)), told)
+    return Recording(keep_table_of_dwells(dwells, history, name, _archive_address(archive)), told)
 
 
-def _place(archive: str | Path | None) -> str:
+def _archive_address(archive: str | Path | None) -> str:
     return str(session_folder() / "archive") if archive is None else str(archive)
 
 
@@ -204,13 +204,13 @@ def _imported(
             f"rate_hz=…; recognised: {seen.import_command}"
         )
     build(keys, name)
-    done = import_document([*paths], keys, name, "", _place(archive), None, nullcontext)
-    run = Archive(_place(archive)).run(done["run"])
+    done = import_document([*paths], keys, name, "", _archive_address(archive), None, nullcontext)
+    run = Archive(_archive_address(archive)).run(done["run"])
     return Recording(run, _told(seen, proposal, done["remarks"]), Proposal(keys).command(paths))
 
 
 def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str]:
-    """What is neither stated nor recognised."""
+    """Keys and columns that are neither stated nor recognised; empty where the mapping is complete."""
     blanks = {"COLUMN", "UNIT", "HZ"}
     left = [f"column {m}" for m, name in keys["columns"].items() if name in blanks]
     left += [f"unit of {what}" for what, unit in keys["units"].items() if unit in blanks]

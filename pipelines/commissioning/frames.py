@@ -41,14 +41,14 @@ def kind_of(exchange: Exchange) -> Kind:
 def timeline(recording: FrameFile) -> Chart:
     """Exchanges by device over time, and the time until each answer."""
     exchanges = _thinned(recording.exchanges)
-    places = list(dict.fromkeys(recording.place_of(exchange) for exchange in exchanges))
+    places = list(dict.fromkeys(recording.name_of(exchange) for exchange in exchanges))
     at, spent = [], []
     for kind, role, symbol, beside in KINDS:
         of_kind = [exchange for exchange in exchanges if kind_of(exchange) == kind]
         if not of_kind:
             continue
         time = np.array([exchange.at_s for exchange in of_kind])
-        row = np.array([places.index(recording.place_of(exchange)) + beside for exchange in of_kind])
+        row = np.array([places.index(recording.name_of(exchange)) + beside for exchange in of_kind])
         texts = tuple(_told(recording, exchange) for exchange in of_kind)
         at.append(Trace(kind, time, row, role=role, symbol=symbol, size=7.0, texts=texts))
         if kind != "no answer":
@@ -80,7 +80,7 @@ def _thinned(exchanges: Sequence[Exchange]) -> list[Exchange]:
 
 def _told(recording: FrameFile, exchange: Exchange) -> str:
     answer = said(exchange, recording.device_of(exchange))
-    return f"{recording.place_of(exchange)}: {exchange.what} → {answer[:120]}, {1e3 * exchange.seconds:.1f} ms"
+    return f"{recording.name_of(exchange)}: {exchange.what} → {answer[:120]}, {1e3 * exchange.seconds:.1f} ms"
 
 
 MOST_ROWS = 2_000
@@ -91,7 +91,7 @@ def devices_of(recording: FrameFile) -> list[RecordedDeviceRow]:
     answers = [(recording.device_of(exchange), exchange.reply is None) for exchange in recording.exchanges]
     return [
         {
-            "place": device.place,
+            "place": device.name,
             "link": device.link,
             "device_id": device.device_id,
             "profile": "" if device.profile is None else device.profile.name,
@@ -109,7 +109,7 @@ def frames_document(recording: FrameFile, limit: int | None = None) -> FramesDoc
         {
             "at_s": exchange.at_s,
             "seconds": exchange.seconds,
-            "place": recording.place_of(exchange),
+            "place": recording.name_of(exchange),
             "kind": kind_of(exchange),
             "what": exchange.what,
             "answer": said(exchange, recording.device_of(exchange)),

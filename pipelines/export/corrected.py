@@ -65,7 +65,7 @@ class KeptTrack:
 
 @dataclass(frozen=True)
 class Tracking:
-    """How the bias is tracked.
+    """Settings of the tracking of the bias.
 
     force : (3,), g, of all samples, whatever the recording states; None: as it states
     magnitude : g, of the force on a unit at rest; None: the recording is not searched for rest
@@ -88,8 +88,8 @@ class Corrected:
     force : (n, 3), g, zero across the axes
     covariance : (n, m, m), g², of the calibration; with a track also of the bias and of noise
     track : of the steps, and of the samples after the last whole step as one step without update
-    at_limits : the same with the upper limits (95 %) of the terms that the static record does not identify; None where it goes on
-    kept : what the next recording goes on with · white : (3,), g/√Hz, of the samples
+    at_limits : the track with upper limits (95 %) of the terms that the static record does not identify; None where it goes on
+    kept : the state from which the next recording continues · white : (3,), g/√Hz, of the samples
     bias, bias_covariance : at the samples; None without tracking
     outside : samples beyond the temperatures that were measured
     """
@@ -111,7 +111,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
 
     Parameters
     ----------
-    unit : may be empty where the run has one unit
+    unit : serial number; may be empty where the run has a single unit
     """
     missing = [name for name in ("coefficients", "covariance") if name not in run.tables()]
     if missing:
@@ -147,12 +147,12 @@ def _budget(run: Run, unit: str, size: int) -> Array | None:
     """Covariance of the coefficients by the uncertainty budget; None where no references are stated."""
     if "budget_covariance" not in run.tables():
         return None
-    own = run.table("budget_covariance")
-    own = own[own["unit"] == unit]
-    if len(own) != size * (size + 1) // 2:
+    rows = run.table("budget_covariance")
+    rows = rows[rows["unit"] == unit]
+    if len(rows) != size * (size + 1) // 2:
         return None
     matrix = np.zeros((size, size))
-    row, column, value = (own[name].to_numpy() for name in ("row", "column", "value"))
+    row, column, value = (rows[name].to_numpy() for name in ("row", "column", "value"))
     matrix[row, column] = value
     matrix[column, row] = value
     return matrix
@@ -166,10 +166,10 @@ def corrected(recording: CorrectableRecording, fit: FitOfUnit, tracking: Trackin
     DataRejected
         The model needs a quantity that the recording does not have, or the force is known nowhere.
     """
-    own = (fit.effects, recording.state)
+    model = (fit.effects, recording.state)
     with np.errstate(over="ignore", invalid="ignore"):  # a sample without a solution is refused below
-        force = correct(*own, recording.output, fit.coefficients, fit.nonlinear)
-        step = remaining_step(*own, recording.output, fit.coefficients, fit.nonlinear, force)
+        force = correct(*model, recording.output, fit.coefficients, fit.nonlinear)
+        step = remaining_step(*model, recording.output, fit.coefficients, fit.nonlinear, force)
     unsolved = ~(np.max(np.abs(step), axis=-1) < CONVERGED_G)  # a nan is not converged
     if unsolved.any():
         raise DataRejected(
@@ -221,17 +221,17 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
     terms, limits = terms_of_unit(fit)
     tracks = [
         track(
-            bias_model(one.white, one.instability, one.walk, tracking.turn_on_ug / MICRO, flicker),
+            bias_model(noise.white, noise.instability, noise.walk, tracking.turn_on_ug / MICRO, flicker),
             middle, force, known, magnitude, per / rate, None if begin is None else (begin.state, begin.time_s),
         )
-        for one in ((terms, limits) if begin is None else (terms,))
+        for noise in ((terms, limits) if begin is None else (terms,))
     ]  # fmt: skip
     bias_track, at_limits = tracks[0], tracks[1] if begin is None else None
     last = np.arange(len(time)) // per
-    bias, own = bias_track.expected[last], bias_track.expected_covariance[last]
-    covariance = plain.covariance + own + np.diag(_within_a_step(terms, per, rate))
+    bias, bias_covariance = bias_track.expected[last], bias_track.expected_covariance[last]
+    covariance = plain.covariance + bias_covariance + np.diag(_within_a_step(terms, per, rate))
     return replace(
-        plain, force=plain.force - bias, covariance=covariance, track=bias_track, bias=bias, bias_covariance=own,
+        plain, force=plain.force - bias, covariance=covariance, track=bias_track, bias=bias, bias_covariance=bias_covariance,
         updated=bias_track.updated[last], at_limits=at_limits, white=terms.white,
         kept=KeptTrack(bias_track.end, float(middle[-1]), flicker),
     )  # fmt: skip
@@ -318,8 +318,8 @@ def table_of(recording: CorrectableRecording, done: Corrected) -> pd.DataFrame:
     columns |= {f"u_{AXES[axis]}_ug": MICRO * sd[:, k] for k, axis in enumerate(axes)}
     columns |= {f"cov_{AXES[i]}{AXES[j]}_ug2": MICRO**2 * done.covariance[:, i, j] for i, j in PAIRS if j < len(axes)}
     if done.bias is not None and done.bias_covariance is not None and done.updated is not None:
-        own = np.sqrt(np.diagonal(done.bias_covariance, axis1=1, axis2=2))
+        bias_sd = np.sqrt(np.diagonal(done.bias_covariance, axis1=1, axis2=2))
         columns |= {f"bias_{axis}_ug": MICRO * done.bias[:, i] for i, axis in enumerate(AXES)}
-        columns |= {f"u_bias_{axis}_ug": MICRO * own[:, i] for i, axis in enumerate(AXES)}
+        columns |= {f"u_bias_{axis}_ug": MICRO * bias_sd[:, i] for i, axis in enumerate(AXES)}
         columns["updated"] = done.updated.astype(np.float64)
     return pd.DataFrame(columns)

@@ -27,7 +27,7 @@ def tracking_of(
     *,
     at_rest: bool,
 ) -> Tracking | None:
-    """How the bias is tracked; None where the force is known at no sample.
+    """The settings of the tracking; None where the force is known at no sample.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def tracking_of(
 def correction_document(
     recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, tracking: Tracking | None, output: Path | None
 ) -> CorrectDocument:
-    """What was corrected, with which calibration, how well, and the bias where it was tracked."""
+    """The document of a correction: recording, calibration, uncertainties, and the bias where it was tracked."""
     sd = _deviation_ug(done.covariance)
     certificate = fit.exported.certificate
     document: CorrectDocument = {
@@ -117,7 +117,7 @@ def _states_force(recording: CorrectableRecording) -> bool:
 
 
 def _force_from(recording: CorrectableRecording, tracking: Tracking) -> list[str]:
-    """Where the force is known from, a phrase each; of columns that do not count it is said that they do not."""
+    """The sources of the known force, a phrase each; columns that are not used are named as such."""
     columns = f"the file's columns {', '.join(FORCE_COLUMNS)}"
     found = list[str]()
     if tracking.force is not None:

@@ -10,7 +10,7 @@
     10      uint16    0
     12      uint32    sequence number: of two valid copies the larger one counts
     16      char[64]  serial number, filled with 0
-    80      uint32    number of the certificate (3 of SN1/3); 0 without one
+    80      uint32    number of the certificate (3 of SN1/3); 0 without a certificate
     84      uint32    date, yyyymmdd
     88      float32   lowest, then highest measured temperature, °C
     96      float64   output per g by which Q24 divides the output; 0 for float32
@@ -105,9 +105,9 @@ def block_of(
     moved = replace(unit, bias=bias)
     shared = (form, sequence, unit.unit, certificate, date, unit.temperatures)
     if form == "q24":
-        whole = fixed_point(moved)
-        exact = [v.astype(np.float64) for v in (whole.bias, whole.inverse)]
-        return CoefficientBlock(*shared, whole.scale, offsets, *exact)
+        fixed = fixed_point(moved)
+        exact = [v.astype(np.float64) for v in (fixed.bias, fixed.inverse)]
+        return CoefficientBlock(*shared, fixed.scale, offsets, *exact)
     exact = [v.astype(np.float32).astype(np.float64) for v in (moved.bias, moved.response)]
     return CoefficientBlock(*shared, 0.0, offsets, *exact)
 

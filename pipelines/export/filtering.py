@@ -1,4 +1,4 @@
-"""A low-pass filter behind a correction: chosen from the measured bandwidth, run by sample, kept between files."""
+"""A low-pass filter behind a correction: chosen from the measured bandwidth, run by sample, its state stored between files."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def chosen_filter(
 
 @dataclass(frozen=True)
 class Kept:
-    """What is kept between two recordings of a unit: the filter's state (m, 3), or that of its bias, or both."""
+    """The stored state between two recordings of a unit: of the filter (m, 3), of the tracked bias, or of both."""
 
     unit: str
     time_s: float
@@ -84,7 +84,7 @@ def filtered(
 ) -> tuple[Corrected, Array]:
     """The correction with its force behind the filter, and the filter's state at the end.
 
-    After a gap in the recording, and at its beginning, the filter begins as one that has seen the first value for ever. The
+    After a gap in the recording, and at its beginning, the filter begins as if its input had always been the first value. The
     white noise of a sample, where the uncertainty includes it, falls by the filter's noise gain; what lasts longer passes.
     """
     rate, gap = rate_and_gaps(recording.time)
@@ -99,8 +99,8 @@ def filtered(
             )
     parts: list[Array] = []
     for first, last in pairwise([0, *np.flatnonzero(gap).tolist(), len(done.force)]):
-        own = chosen.steady(done.force[first]) if state is None or first else state
-        smooth, state = chosen.apply(done.force[first:last], own)
+        begun = chosen.steady(done.force[first]) if state is None or first else state
+        smooth, state = chosen.apply(done.force[first:last], begun)
         parts.append(smooth)
     if state is None:
         raise DataRejected(f"{recording.name}: no samples, some are needed for a filter; record them")
@@ -125,7 +125,7 @@ def filter_document(chosen: OutputFilter, source: str) -> FilterDocument:
 
 
 def read_state(path: Path, unit: str) -> Kept | None:
-    """What an earlier correction kept; None where there is no file yet.
+    """The state that an earlier correction stored; None where there is no file yet.
 
     Raises
     ------
@@ -136,22 +136,25 @@ def read_state(path: Path, unit: str) -> Kept | None:
         return None
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        kept = _kept(content)
+        state = _kept(content)
     except (ValueError, KeyError, TypeError, UnicodeDecodeError):
         raise DataRejected(
             f"{path.name}: not the state that 'tumbleline correct --state' keeps, one is needed; name another file"
         ) from None
-    if kept.unit != unit:
-        raise DataRejected(f"{path.name}: the state of unit {kept.unit}, that of {unit} is needed; name another file")
-    return kept
+    if state.unit != unit:
+        raise DataRejected(f"{path.name}: the state of unit {state.unit}, that of {unit} is needed; name another file")
+    return state
 
 
 def _kept(content: dict[str, Any]) -> Kept:
-    own, track = content["filter"], content["track"]
+    low_pass, track = content["filter"], content["track"]
     passed = followed = None
-    if own is not None:
-        taps = (np.array(own[name], dtype=np.float64) for name in ("numerator", "denominator"))
-        passed = OutputFilter(own["kind"], float(own["rate_hz"]), *taps), np.array(own["state"], dtype=np.float64)
+    if low_pass is not None:
+        taps = (np.array(low_pass[name], dtype=np.float64) for name in ("numerator", "denominator"))
+        passed = (
+            OutputFilter(low_pass["kind"], float(low_pass["rate_hz"]), *taps),
+            np.array(low_pass["state"], dtype=np.float64),
+        )
     if track is not None:
         state = BiasState(*(np.array(track[name], dtype=np.float64) for name in ("x", "p")))
         arrays = {name: np.array(track[name]) for name in ("sd", "correlation_s")}
@@ -160,16 +163,16 @@ def _kept(content: dict[str, Any]) -> Kept:
     return Kept(str(content["unit"]), float(content["time_s"]), passed, followed)
 
 
-def write_state(path: Path, kept: Kept) -> None:
+def write_state(path: Path, state: Kept) -> None:
     """Keep the state; the numbers are written so that they are read back bit for bit.
 
     The names of its keys are those of the attributes of filter, bias and flicker: whoever renames one changes the file's format.
     """
-    own, track = kept.filter, kept.track
+    low_pass, track = state.filter, state.track
     content = {
-        "unit": kept.unit,
-        "time_s": kept.time_s,
-        "filter": None if own is None else _plain(vars(own[0]) | {"state": own[1]}),
+        "unit": state.unit,
+        "time_s": state.time_s,
+        "filter": None if low_pass is None else _plain(vars(low_pass[0]) | {"state": low_pass[1]}),
         "track": None if track is None else _plain({"time_s": track.time_s} | vars(track.state) | vars(track.flicker)),
     }
     files.publish(path, files.json_bytes(content), "correct", files.ELSEWHERE)
@@ -181,7 +184,7 @@ def _plain(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def filter_rate(recording: CorrectableRecording, begin: Kept | None) -> float:
-    """The rate of the samples, Hz; that of the kept filter where it is the same but for its last digits."""
+    """The rate of the samples, Hz; that of the stored filter where both agree but for the last digits."""
     rate = rate_and_gaps(recording.time)[0]
     if begin is None or begin.filter is None:
         return rate

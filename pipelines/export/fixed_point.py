@@ -60,21 +60,21 @@ def fixed_point(unit: UnitCalibration) -> FixedPoint:
     WrongUse
         A coefficient is beyond ±128.
     """
-    own = list(unit.axes)
-    whole = unit.with_every_axis
-    scale = float(np.mean(np.diag(whole.response[0])[own]))
+    axes = list(unit.axes)
+    full = unit.with_every_axis
+    scale = float(np.mean(np.diag(full.response[0])[axes]))
     per_axis = np.ones(len(AXES))
-    per_axis[own] = scale
+    per_axis[axes] = scale
     span = TEMPERATURE_SPAN_K ** np.arange(ORDER)
     low, high = unit.temperatures
     middle, half = 0.5 * (low + high) - 25.0, 0.5 * (high - low)
-    order = ORDER if half > 0.0 and np.any(whole.response[1:]) else 1
+    order = ORDER if half > 0.0 and np.any(full.response[1:]) else 1
     theta = middle + half * np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-    response = np.einsum("tk,kij->tij", theta[:, None] ** np.arange(ORDER), whole.response) / per_axis[:, None]
+    response = np.einsum("tk,kij->tij", theta[:, None] ** np.arange(ORDER), full.response) / per_axis[:, None]
     inverse = np.zeros((ORDER, 9))
     powers = (theta[:, None] / TEMPERATURE_SPAN_K) ** np.arange(order)
     inverse[:order] = np.linalg.lstsq(powers, np.linalg.inv(response).reshape(_NODES, 9), rcond=None)[0]
-    values = np.rint(whole.bias / per_axis * span[:, None] * ONE), np.rint(inverse.reshape(ORDER, 3, 3) * ONE)
+    values = np.rint(full.bias / per_axis * span[:, None] * ONE), np.rint(inverse.reshape(ORDER, 3, 3) * ONE)
     largest = max(float(np.max(np.abs(v))) for v in values)
     if not largest <= _LARGEST:
         raise WrongUse(
@@ -82,7 +82,7 @@ def fixed_point(unit: UnitCalibration) -> FixedPoint:
             "range; export with --set arithmetic=float"
         )
     bias, matrix = (v.astype(np.int64) for v in values)
-    for axis in set(range(len(AXES))) - set(own):
+    for axis in set(range(len(AXES))) - set(axes):
         matrix[:, axis] = 0
         matrix[0, axis, axis] = ONE
     return FixedPoint(scale, bias, matrix, thousandths(unit.temperatures))

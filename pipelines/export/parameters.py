@@ -15,7 +15,7 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 
 @dataclass(frozen=True)
 class Offsets:
-    """What an autopilot applies, as its parameters hold it (float32).
+    """The offsets and scales that an autopilot applies, as its parameters hold them (float32).
 
     offset : (3,), m/s², at ``at_C``; scale : (3,)
     thermal : (4, 3), m/s² per K^k, coefficients of (T − 25 °C)^k, zero where the format gets no temperature terms

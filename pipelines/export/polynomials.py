@@ -36,10 +36,10 @@ class UnitCalibration:
 
     bias : (4, m), output unit per K^k, coefficients of θ⁰ … θ³, of the m axes that have an output
     response : (4, m, 3), output unit per g and K^k
-    left_out : effects of the model that have no place in this form
+    left_out : effects of the model that this form cannot hold
     reasons : why it failed its limits; empty where it passed
     certificate : that the unit has for this run; None where it was not certified
-    noise : terms of its static record; None without one
+    noise : terms of its static record; None without that record
     full_scale : largest excursion of the output from 0 g, output unit; None where it is not recorded
     dwells : that the calibration is made from, those of verification left out
     nominal : output per g that the data sheet of this kind of device states, by its preset; None where no preset is known
@@ -68,20 +68,20 @@ class UnitCalibration:
 
     @property
     def with_every_axis(self) -> UnitCalibration:
-        """The calibration with three outputs: that of an axis without one is the force along it in g, 0 where it is not known."""
+        """The calibration with three outputs: for an axis without an output it is the force along it in g, 0 where unknown."""
         if self.bias.shape[-1] == len(AXES):
             return self
-        own = list(self.axes)
+        axes = list(self.axes)
         bias, response = np.zeros((ORDER, len(AXES))), np.zeros((ORDER, len(AXES), 3))
         response[0] = np.eye(len(AXES))
-        bias[:, own], response[:, own] = self.bias, self.response
+        bias[:, axes], response[:, axes] = self.bias, self.response
         return replace(self, bias=bias, response=response)
 
     def with_forces(self, output: Array, force: Array) -> Array:
         """Outputs (3,) of :attr:`with_every_axis`, from those of the axes that have one, under a known force (3,), g."""
-        whole = np.array(force, dtype=np.float64)
-        whole[list(self.axes)] = output
-        return whole
+        outputs = np.array(force, dtype=np.float64)
+        outputs[list(self.axes)] = output
+        return outputs
 
     @property
     def certified(self) -> str:
@@ -233,13 +233,13 @@ def revoked_units(run: Run) -> dict[str, validity.Calibration]:
     if "grades" not in run.tables():
         return {}
     states = stated(run, tuple(run.table("grades")["unit"]))
-    return {unit: one for unit, one in states.items() if one.state == "revoked"}
+    return {unit: calibration for unit, calibration in states.items() if calibration.state == "revoked"}
 
 
 def _not_revoked(
     run: Run, chosen: list[str], certificates: Mapping[str, validity.Calibration], *, named: bool
 ) -> list[str]:
-    """Units whose calibration was not revoked; refused where one is named, or none is left."""
+    """Units whose calibration was not revoked; refused where a revoked unit is named, or no unit is left."""
     gone = [unit for unit in chosen if unit in certificates and certificates[unit].state == "revoked"]
     if gone and (named or len(gone) == len(chosen)):
         raise WrongUse(
@@ -268,7 +268,7 @@ def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> 
 
 
 def effects_left_out(calibration: Calibration) -> tuple[str, ...]:
-    """Effects of a model that have no place in polynomials of temperature."""
+    """Effects of a model that polynomials of temperature cannot hold."""
     return tuple(effect for effect in calibration.effects if effect not in {*BIAS, *SCALE, *ACROSS})
 
 
@@ -286,8 +286,8 @@ def polynomials(calibration: Calibration, unit: str) -> tuple[Array, Array]:
         if values.size:
             for row, axis in enumerate(axes):
                 # one column where the poses of a device with fewer axes show one direction across
-                own = [name for name_of, name in calibration.names[row] if name_of == effect]
-                shown = others(axis) if len(own) > 1 else ["xyz".index(own[0][-1])]
+                names = [name for name_of, name in calibration.names[row] if name_of == effect]
+                shown = others(axis) if len(names) > 1 else ["xyz".index(names[0][-1])]
                 response[power, row, shown] = values[row]
     for power, effect in enumerate(SCALE):
         values = calibration.value(effect)[u]

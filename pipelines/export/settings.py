@@ -37,26 +37,26 @@ class Firmware:
     def names(
         self, literal: Callable[[Any], str], braces: Callable[[Any, Callable[[Any], str]], str]
     ) -> dict[str, str]:
-        """What stands in the template of the low-pass."""
-        one = self.low_pass
-        if one is None:
+        """Values of the fields in the template of the low-pass; empty without a low-pass."""
+        low_pass = self.low_pass
+        if low_pass is None:
             return {}
-        steady = np.concatenate([one.steady(np.ones(1))[:, 0], [0.0]])
+        steady = np.concatenate([low_pass.steady(np.ones(1))[:, 0], [0.0]])
         return {
-            "FILTER": f"{one.kind}, {one.numerator.size} coefficients",
-            "CUTOFF": f"{one.cutoff_hz:.6g}",
-            "RATE": f"{one.rate_hz:.9g}",
-            "DELAY": f"{1e3 * one.delay_s:.4g}",
-            "TAPS": str(one.numerator.size),
-            "B": braces(one.numerator, literal),
-            "A": braces(one.denominator, literal),
+            "FILTER": f"{low_pass.kind}, {low_pass.numerator.size} coefficients",
+            "CUTOFF": f"{low_pass.cutoff_hz:.6g}",
+            "RATE": f"{low_pass.rate_hz:.9g}",
+            "DELAY": f"{1e3 * low_pass.delay_s:.4g}",
+            "TAPS": str(low_pass.numerator.size),
+            "B": braces(low_pass.numerator, literal),
+            "A": braces(low_pass.denominator, literal),
             "STEADY": braces(steady, literal),
         }
 
     def models(
         self, symbols: dict[str, str], literal: Callable[[Any], str], braces: Callable[[Any, Callable[[Any], str]], str]
     ) -> dict[str, str]:
-        """What stands in the template of the bias: ``symbols`` are the C names of the units."""
+        """Values of the fields in the template of the bias model: ``symbols`` are the C names of the units."""
         if not self.bias:
             return {}
         texts: list[str] = []
@@ -112,7 +112,7 @@ class ExportSettings:
             raise WrongUse(f"--set counts_per_g: found {self.counts_per_g}, 1 or more is needed; correct it")
 
     def nominal_for(self, unit: UnitCalibration, what: str) -> float:
-        """The driver's output per g: the one given, else that of the unit's preset; refused where neither states it."""
+        """The driver's output per g: the given value, else that of the unit's preset; refused where neither states it."""
         nominal = unit.nominal if self.nominal is None else self.nominal
         if nominal is None or not nominal > 0.0:
             found = "none is given and no preset states it" if nominal is None else f"{nominal:g}"
@@ -129,7 +129,7 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
     Raises
     ------
     WrongUse
-        An identification is not a number, a unit is not exported, or two units have the same identification.
+        An identification is not a number, a unit is not exported, or two units share an identification.
     """
     ids: dict[str, int] = {}
     for part in filter(None, map(str.strip, text.split(","))):

@@ -62,12 +62,12 @@ def swept_files(
     for unit in chosen:
         refuse_digital(unit, str(readings.loc[[unit], "out_unit"].iloc[0]))
         certificate, serial = certificates.get(unit), serials_of[unit]
-        own = with_period(unit, certificate, sheet)
-        text = heading(unit, standing(*grades[unit][1:], certificate), run.id, own, serial)
+        dated = with_period(unit, certificate, sheet)
+        text = heading(unit, standing(*grades[unit][1:], certificate), run.id, dated, serial)
         for name, axis in rows[rows["unit"] == unit].groupby("axis", sort=True):
-            one, lines = swept_axis(unit, axis, AXES.index(str(name)))
-            files[f"{unit}-{name}.teds"] = page(own, serial, one)
-            text += [*axis_lines({str(name): one}), *lines]
+            sensor, lines = swept_axis(unit, axis, AXES.index(str(name)))
+            files[f"{unit}-{name}.teds"] = page(dated, serial, sensor)
+            text += [*axis_lines({str(name): sensor}), *lines]
         if (rows["unit"] != unit).all():
             raise WrongUse(
                 f"export: unit {unit} has no point of a sweep with a value; check its cable, and measure again"
@@ -77,7 +77,7 @@ def swept_files(
 
 
 def swept_axis(unit: str, rows: pd.DataFrame, axis: int) -> tuple[Accelerometer, list[str]]:
-    """What template 25 states of the points of one axis, and what is said of it."""
+    """The entries of template 25 for the points of one axis, and lines of text on them."""
     rows = _one_state(unit, rows)
     points = transfer_points(rows)
     c = points.conditions
@@ -112,7 +112,7 @@ def _one_state(unit: str, rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _transfer(rows: pd.DataFrame, at: int) -> tuple[TransferFunction | None, str]:
-    """One pole and one resonance by the points, where they are identified and describe the magnitude; else why not."""
+    """A transfer function of one pole and one resonance, where the points identify it and it describes them; else the reason."""
     points = transfer_points(rows)
     try:
         found: TransferDiagnosis = diagnose_transfer(points, ("second_order", "one_pole", "delay"))
@@ -142,13 +142,13 @@ def _transfer(rows: pd.DataFrame, at: int) -> tuple[TransferFunction | None, str
     )
 
 
-def _percent(one: TransferFunction, points: Points, at: int) -> Array:
+def _percent(function: TransferFunction, points: Points, at: int) -> Array:
     """Departure of the magnitude from that of the points (n,), both over those of one point."""
-    size, measured = _magnitude(one, points.conditions), np.abs(points.value)
+    size, measured = _magnitude(function, points.conditions), np.abs(points.value)
     return np.asarray(100.0 * np.abs(size / size[at] / (measured / measured[at]) - 1.0))
 
 
-def _magnitude(one: TransferFunction, conditions: Conditions) -> Array:
-    ratio = conditions.frequency / one.resonance_hz
-    resonance = np.abs(1.0 - ratio**2 + 1j * ratio / one.quality)
-    return np.asarray(1.0 / resonance / np.hypot(1.0, conditions.frequency / one.pole_hz))
+def _magnitude(function: TransferFunction, conditions: Conditions) -> Array:
+    ratio = conditions.frequency / function.resonance_hz
+    resonance = np.abs(1.0 - ratio**2 + 1j * ratio / function.quality)
+    return np.asarray(1.0 / resonance / np.hypot(1.0, conditions.frequency / function.pole_hz))

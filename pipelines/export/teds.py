@@ -44,7 +44,7 @@ class ConRelRes:
         Raises
         ------
         WrongUse
-            No n is that near. The published ranges end one below all ones.
+            No n is that near. The published ranges end one below the word whose bits are all set.
         """
         n = round(log(value / self.start) / log1p(2.0 * self.tolerance))
         highest = 2**self.bits - 2
@@ -56,11 +56,11 @@ class ConRelRes:
         return n
 
     def value(self, code: int) -> float:
-        """What a reader makes of n."""
+        """The value that a reader decodes from the code n."""
         return self.start * (1.0 + 2.0 * self.tolerance) ** code
 
     def stated(self, value: float) -> float:
-        """What a reader makes of a value."""
+        """The value that a reader decodes after it was encoded, which is rounded."""
         return self.value(self.code(value))
 
 
@@ -86,7 +86,7 @@ _TEXTS = {"version": (r"[A-Z](\d|[1-5]\d|6[0-3])", "A0 to Z63"), "initials": (r"
 
 @dataclass(frozen=True)
 class DataSheet:
-    """What a run does not contain, and the day on which it was measured.
+    """Entries of the TEDS that a run does not contain, and the day of the measurement.
 
     manufacturer : number given by IEEE; model : the maker's number; version : letter and number; mass_g : of the sensor
     initials : of who calibrated; period_days : to the next calibration; None: not stated, and 0 in the page
@@ -158,7 +158,7 @@ class TransferFunction:
 
     @property
     def bits(self) -> list[tuple[int, int]]:
-        """Its fields."""
+        """The fields of the transfer function, as (code, bits)."""
         return [
             (POLE.code(self.pole_hz), 7), (RESONANCE.code(self.resonance_hz), 9), (QUALITY.code(self.quality), 9),
             (_NO_SLOPE, 7), (_NO_TEMPERATURE, 6),
@@ -167,7 +167,7 @@ class TransferFunction:
 
 @dataclass(frozen=True)
 class Accelerometer:
-    """What template 25 states of one axis: an accelerometer with fixed sensitivity.
+    """The entries of template 25 for one axis: an accelerometer with fixed sensitivity.
 
     sensitivity : V/(m/s²), negative where the output falls with the force; axis : 0 to 2; reference_C : 15 to 30 °C
     """
@@ -206,9 +206,9 @@ def _letters(text: str) -> int:
 
 
 def _packed(parts: Iterable[tuple[int, int]]) -> bytes:
-    """Values of some bits each, one after another."""
-    whole = at = 0
+    """The (value, bits) pairs packed bit by bit, least significant first."""
+    packed = at = 0
     for value, bits in parts:
-        whole |= value << at
+        packed |= value << at
         at += bits
-    return whole.to_bytes(-(-at // 8), "little")
+    return packed.to_bytes(-(-at // 8), "little")

@@ -124,12 +124,12 @@ def drawn_bias(model: BiasModel, steps: Array, rng: np.random.Generator) -> Arra
     """
     n, (axes, parts) = len(steps), model.sd.shape
     keep = np.exp(-steps[:, None] / model.correlation_s)
-    own = model.sd * rng.normal(size=(axes, parts))
+    wander = model.sd * rng.normal(size=(axes, parts))
     bias = np.empty((n, axes))
     kicks = rng.normal(size=(n, axes, parts))
     for k in range(n):
-        own = keep[k] * own + model.sd * np.sqrt(1.0 - keep[k] ** 2) * kicks[k]
-        bias[k] = own.sum(axis=1)
+        wander = keep[k] * wander + model.sd * np.sqrt(1.0 - keep[k] ** 2) * kicks[k]
+        bias[k] = wander.sum(axis=1)
     return bias + np.cumsum(model.walk * np.sqrt(steps)[:, None] * rng.normal(size=(n, axes)), axis=0)
 
 
@@ -168,11 +168,11 @@ def write_output(made: SimulatedOutput, output: Path) -> None:
 def simulation_document(
     made: SimulatedOutput, fit: FitOfUnit, low_pass: OutputFilter | None, seed: int | None, output: Path
 ) -> SimulateDocument:
-    """What was simulated."""
-    own, whole = fit.exported, fit.exported.with_every_axis
+    """The document of a simulation: unit, samples, noise, clipping and error."""
+    unit, full = fit.exported, fit.exported.with_every_axis
     output_of_all = made.force.copy()
-    output_of_all[:, list(own.axes)] = made.output
-    error = (np.linalg.solve(whole.response[0], (output_of_all - whole.bias[0]).T).T - made.force)[:, list(own.axes)]
+    output_of_all[:, list(unit.axes)] = made.output
+    error = (np.linalg.solve(full.response[0], (output_of_all - full.bias[0]).T).T - made.force)[:, list(unit.axes)]
     return {
         "file": made.recording.name,
         "run": fit.run,
@@ -183,7 +183,7 @@ def simulation_document(
         "seed": seed,
         "noise": made.noise,
         "clipped": made.clipped,
-        "error_at_25_C_ug": dict(zip(own.letters, (MICRO * np.sqrt(np.mean(error**2, axis=0))).tolist(), strict=True)),
+        "error_at_25_C_ug": dict(zip(unit.letters, (MICRO * np.sqrt(np.mean(error**2, axis=0))).tolist(), strict=True)),
         "told": list(made.told),
         "output": str(output),
     }

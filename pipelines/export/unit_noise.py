@@ -30,7 +30,7 @@ class UnitNoise:
     rate_hz: float
 
     def remark(self, symbol: str) -> str:
-        """Which axes have an upper limit in place of a value; empty where none has."""
+        """Remark on the axes that have an upper limit instead of a value; empty where no axis has."""
         limits = [axis for axis, known in zip(AXES, self.identified[symbol], strict=False) if not known]
         return f"upper limit (95 %), not identified: {', '.join(limits)}" if limits else ""
 
@@ -47,9 +47,11 @@ def noise_of_units(run: Run) -> dict[str, UnitNoise]:
     noises: dict[str, UnitNoise] = {}
     for unit in dict.fromkeys(key[0] for key in rows):
         axes = [axis for axis in AXES if any((unit, symbol, axis) in rows for symbol in TERMS)]
-        own = {symbol: [rows[unit, symbol, axis] for axis in axes] for symbol in TERMS}
-        value = {s: np.array([float(r["value"] if r["identified"] else r["high"]) for r in own[s]]) for s in TERMS}
-        identified = {s: np.array([bool(r["identified"]) for r in own[s]]) for s in TERMS}
+        by_symbol = {symbol: [rows[unit, symbol, axis] for axis in axes] for symbol in TERMS}
+        value = {
+            s: np.array([float(r["value"] if r["identified"] else r["high"]) for r in by_symbol[s]]) for s in TERMS
+        }
+        identified = {s: np.array([bool(r["identified"]) for r in by_symbol[s]]) for s in TERMS}
         noises[unit] = UnitNoise(value, identified, float(rates.iloc[0]))
     return noises
 
@@ -68,12 +70,12 @@ def curve_of_unit(run: Run, unit: str) -> UnitCurve | None:
     """The Allan curves of a unit's static record; None where an axis has none or no mixture of noise terms explains it."""
     if not {"allan", "readings"} <= set(run.tables()):
         return None
-    own = run.table("allan")
-    own = own[own["unit"] == unit]
-    axes = [rows for axis in AXES if len(rows := own[own["axis"] == axis])]
+    curves = run.table("allan")
+    curves = curves[curves["unit"] == unit]
+    axes = [rows for axis in AXES if len(rows := curves[curves["axis"] == axis])]
     readings = run.table("readings")
     readings = readings[(readings["kind"] == "allan") & (readings["unit"] == unit) & (readings["status"] == "ok")]
-    if readings.empty or len({len(rows) for rows in axes}) != 1 or own["fitted_ug"].isna().any():
+    if readings.empty or len({len(rows) for rows in axes}) != 1 or curves["fitted_ug"].isna().any():
         return None
     tau = axes[0]["tau_s"].to_numpy(dtype=np.float64)
     rate = 1.0 / float(tau[0])  # of the means that the curve begins with

@@ -1,4 +1,4 @@
-"""Waveforms of a record as files of other programs: the channels of a captured record, and one writer for each format.
+"""Waveforms of a record as files of other programs: the channels of a captured record, and a writer for each format.
 
 A writer gives the bytes of the file, so that all formats are written in one way: complete or not at all.
 """
@@ -77,7 +77,7 @@ def channels_of(run: Run, number: int, unit: str) -> list[Channel]:
             continue
         interval = float((time[-1] - time[0]) / (time.size - 1))
         for k, axis in enumerate(AXES):
-            values = np.concatenate([one[axis].to_numpy(dtype=float) for one in rows])
+            values = np.concatenate([table[axis].to_numpy(dtype=float) for table in rows])
             if np.isfinite(values).any():  # an axis without an output has no samples
                 channels.append(Channel(f"{label} {axis}", text, group, values, interval, k))
     return _same_length(channels)
@@ -88,9 +88,9 @@ def _same_length(channels: list[Channel]) -> list[Channel]:
     intervals = {round(channel.interval_s, 15) for channel in channels}
     if len(intervals) > 1 and max(intervals) - min(intervals) > 1e-9 * max(intervals):
         return channels
-    count = min(len(one.samples) for one in channels)
+    count = min(len(channel.samples) for channel in channels)
     first = channels[0].interval_s
-    return [replace(one, samples=one.samples[:count], interval_s=first) for one in channels]
+    return [replace(channel, samples=channel.samples[:count], interval_s=first) for channel in channels]
 
 
 class Writer(NamedTuple):
@@ -136,14 +136,14 @@ def _lvm(channels: Sequence[Channel]) -> bytes:
         "",
         f"Channels\t{count}",
         "Samples" + "".join(f"\t{len(channel.samples)}" for channel in channels),
-        "Y_Unit_Label" + "".join(f"\t{one.unit}" for one in channels),
+        "Y_Unit_Label" + "".join(f"\t{channel.unit}" for channel in channels),
         "X_Dimension" + "\tTime" * count,
-        "X0" + "".join(f"\t{one.start_s:.17g}" for one in channels),
-        "Delta_X" + "".join(f"\t{one.interval_s:.17g}" for one in channels),
+        "X0" + "".join(f"\t{channel.start_s:.17g}" for channel in channels),
+        "Delta_X" + "".join(f"\t{channel.interval_s:.17g}" for channel in channels),
         end,
-        "X_Value" + "".join(f"\t{one.name}" for one in channels) + "\tComment",
+        "X_Value" + "".join(f"\t{channel.name}" for channel in channels) + "\tComment",
     ]
-    rows = np.column_stack([channels[0].time, *(one.samples for one in channels)])
+    rows = np.column_stack([channels[0].time, *(channel.samples for channel in channels)])
     body = ["\t".join(f"{value:.17g}" for value in row) for row in rows.tolist()]
     return "\n".join([*head, *body, ""]).encode()
 
@@ -190,14 +190,15 @@ def _uff58(channels: Sequence[Channel]) -> bytes:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "waveforms.uff"
         file = pyuff.UFF(str(path))
-        for number, one in enumerate(channels, start=1):
-            known = ACCELERATION if one.unit in {"g", "m/s^2"} else UNKNOWN
+        for number, channel in enumerate(channels, start=1):
+            known = ACCELERATION if channel.unit in {"g", "m/s^2"} else UNKNOWN
             content = {
-                "type": 58, "binary": 1, "func_type": 1, "rsp_node": number, "rsp_dir": one.axis + 1, "ref_node": 0, "ref_dir": 0,
-                "data": np.asarray(one.samples, dtype=np.float64), "x": one.time, "num_pts": len(one.samples), "id1": one.name,
-                "rsp_ent_name": "NONE", "ref_ent_name": "NONE", "abscissa_spacing": 1, "abscissa_min": one.start_s,
-                "abscissa_inc": one.interval_s, "abscissa_spec_data_type": TIME, "abscissa_axis_units_lab": "s",
-                "ordinate_spec_data_type": known, "ordinate_axis_units_lab": one.unit, "orddenom_spec_data_type": UNKNOWN,
+                "type": 58, "binary": 1, "func_type": 1, "rsp_node": number, "rsp_dir": channel.axis + 1,
+                "ref_node": 0, "ref_dir": 0, "data": np.asarray(channel.samples, dtype=np.float64), "x": channel.time,
+                "num_pts": len(channel.samples), "id1": channel.name, "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
+                "abscissa_spacing": 1, "abscissa_min": channel.start_s, "abscissa_inc": channel.interval_s,
+                "abscissa_spec_data_type": TIME, "abscissa_axis_units_lab": "s",
+                "ordinate_spec_data_type": known, "ordinate_axis_units_lab": channel.unit, "orddenom_spec_data_type": UNKNOWN,
                 "ord_data_type": DOUBLE,
             }  # fmt: skip
             with warnings.catch_warnings():  # pyuff leaves the file to the collector; "overwrite" loses binary samples
@@ -248,16 +249,19 @@ def files_of_waveforms(form: str, channels: Sequence[Channel], path: Path) -> di
     if not channels:
         raise WrongUse("waveforms: no channel, at least one is needed; name another record")
     clocks: dict[tuple[float, int, str], list[Channel]] = {}
-    for one in channels:
-        clocks.setdefault((one.interval_s, len(one.samples), one.group), []).append(one)
+    for channel in channels:
+        clocks.setdefault((channel.interval_s, len(channel.samples), channel.group), []).append(channel)
     if not writer.one_clock or len({clock[:2] for clock in clocks}) == 1:
         return {path: writer.made(channels)}
-    return {path.with_name(f"{path.stem}_{clock[2]}{path.suffix}"): writer.made(own) for clock, own in clocks.items()}
+    return {
+        path.with_name(f"{path.stem}_{clock[2]}{path.suffix}"): writer.made(channels)
+        for clock, channels in clocks.items()
+    }
 
 
 def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[Path]:
     """Write the files of the channels, each complete or not at all, and return their paths."""
     made = files_of_waveforms(form, channels, path)
-    for place, data in made.items():
-        files.publish(place, data, "waveforms", files.ELSEWHERE)
+    for target, data in made.items():
+        files.publish(target, data, "waveforms", files.ELSEWHERE)
     return list(made)

@@ -87,9 +87,9 @@ def _summary(audit_result: Audit, listed: list[AuditFinding], page: Path) -> str
         ),
     ]
     for who, role in WHO.items():
-        own = [finding for finding in listed if finding.who == who]
-        if own:
-            lines += ["", f"## {role}", *(f"- {_escaped(finding.message)}" for finding in own[:MOST_ROWS])]
+        of_role = [finding for finding in listed if finding.who == who]
+        if of_role:
+            lines += ["", f"## {role}", *(f"- {_escaped(finding.message)}" for finding in of_role[:MOST_ROWS])]
     return "\n".join(lines if listed else [*lines, "", "No action is needed."])
 
 

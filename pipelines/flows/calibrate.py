@@ -40,9 +40,9 @@ listeners: list[tuple[Progress, Callable[[Done], None], Operator | None]] = []
 
 
 @contextmanager
-def with_last(listed: list[T], one: T) -> Generator[None]:
-    """A context in which one more stands at the end of a list."""
-    listed.append(one)
+def with_last(listed: list[T], item: T) -> Generator[None]:
+    """A context in which an item is appended to a list; it is removed at the end."""
+    listed.append(item)
     try:
         yield
     finally:
@@ -121,7 +121,7 @@ def requested(
     repeat: int | None,
     faults: list[str] | None,
 ) -> Request:
-    """The request of the parameters of a flow run; without ``repeat`` the flow run has its own number, the same for a retry."""
+    """The request of the parameters of a flow run; without ``repeat`` the number of the flow run, which a retry keeps."""
     anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
     where = Path(station) if station else None
     return Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ()))
@@ -160,6 +160,6 @@ def settle_history(name: str, stages: int) -> None:
             tasks = client.read_task_runs(
                 flow_run_filter=flow_filter, sort=TaskRunSort.EXPECTED_START_TIME_ASC, limit=MANY
             )
-            if len(tasks) >= stages and all(one.state_type in FINAL for one in tasks):
+            if len(tasks) >= stages and all(task.state_type in FINAL for task in tasks):
                 return
             time.sleep(0.1)

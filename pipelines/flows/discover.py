@@ -24,10 +24,10 @@ def look(archive: str | None, device: str, pages: Path, workers: int) -> Discove
     """Score what is new, judge the night, write page and document."""
     store = archive_of(archive)
     looked = discovered(store, Look(device=device, workers=workers))
-    place = pages / f"discover-{datetime.now(UTC).date().isoformat()}"
+    path = pages / f"discover-{datetime.now(UTC).date().isoformat()}"
     page = render(looked.findings, looked.document, str(store.root))
-    publish(place.with_suffix(".html"), page.encode(), "discover", ELSEWHERE)
-    publish(place.with_suffix(".json"), json_bytes(json_value(looked.document)), "discover", ELSEWHERE)
+    publish(path.with_suffix(".html"), page.encode(), "discover", ELSEWHERE)
+    publish(path.with_suffix(".json"), json_bytes(json_value(looked.document)), "discover", ELSEWHERE)
     return looked.document
 
 

@@ -22,7 +22,7 @@ from pipelines.inquiry.loop import Consent, InquirySettings, Participants, run_i
 from pipelines.jobs.job import Request
 from pipelines.orchestrator.archive_address import archive_of
 
-_participants: list[Participants] = []  # whom inquiries of this process report to and ask: the last one counts
+_participants: list[Participants] = []  # whom inquiries of this process report to and ask: the last of them counts
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,9 @@ NEEDED = (
 SIMULATED = ("stations.plant.plant", "stations.plant.server")
 """Modules that a run imports, and those of a simulated station: the slow ones."""
 
-_started: list[subprocess.Popen[bytes]] = []  # they end by themselves; kept so that the interpreter does not complain
+_started: list[
+    subprocess.Popen[bytes]
+] = []  # they end by themselves; referenced so that the interpreter does not warn of them
 
 
 def run_locally(
@@ -99,12 +101,12 @@ def _prepare(job: Job) -> None:
         for name in (*NEEDED, *(SIMULATED if job.station.simulation is not None else ())):
             import_module(name)
     for name in (*BY_NAME, "report"):
-        code_hash(name)  # is kept
+        code_hash(name)  # the hash is cached
 
 
 @contextmanager
 def reached(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generator[None]:
-    """A block in which an orchestrator answers: the one named by PREFECT_API_URL, or one of our own in the folder ``home``.
+    """A block in which an orchestrator answers: that named by PREFECT_API_URL, or a server of this process in folder ``home``.
 
     ``meanwhile`` is called while a server of our own starts. This process is its client; the environment is restored afterwards.
     """
@@ -116,13 +118,13 @@ def reached(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generat
         from prefect.settings import temporary_settings
 
         # Prefect reads the environment when it is imported, which an earlier block may have done for another server
-        own: dict[Any, str] = {name: environment[name] for name in ("PREFECT_API_URL", "PREFECT_HOME", CLIENT_KEY)}
-        with temporary_settings(updates=own):
+        updates: dict[Any, str] = {name: environment[name] for name in ("PREFECT_API_URL", "PREFECT_HOME", CLIENT_KEY)}
+        with temporary_settings(updates=updates):
             yield
 
 
 def reach_named() -> None:
-    """Make sure that the orchestrator named by PREFECT_API_URL answers to our key; Prefect's cloud has keys of its own kind."""
+    """Make sure that the orchestrator named by PREFECT_API_URL answers to our key; Prefect's cloud has other keys."""
     if os.environ.get(KEY_FILE) and not os.environ.get(CLIENT_KEY):
         use_key(CLIENT_KEY)
     if not os.environ.get("PREFECT_API_KEY"):

@@ -56,7 +56,7 @@ def waiting() -> list[Waiting]:
             Waiting(str(run.id), run.name, _question(client, run))
             for run in client.read_flow_runs(flow_run_filter=flow_filter)
         ]
-    return [one for one in waiting_runs if one.question]
+    return [run for run in waiting_runs if run.question]
 
 
 def answer(flow_run: str, reply: Answer) -> None:

@@ -1,7 +1,7 @@
 """Seconds from the time of a foreign file: stamps of date and time, Unix time, counters in s, ms, µs or ns.
 
 The unit of a counter is what the file states, else what its steps allow; if they allow several, it must be given. A given unit
-that contradicts the file is refused; one that contradicts the steps gives a remark.
+that contradicts the file is refused; a unit that contradicts the steps gives a remark.
 """
 
 from __future__ import annotations
@@ -74,16 +74,16 @@ def recognised(numbers: Array, name: str, stated: str = "") -> Recognised:
     name : of the column; `time_ms` states a unit.
     stated : unit that the file states elsewhere.
     """
-    own = unit_stated(stated)
-    if own:
-        return Recognised(own, f"the file states {stated}", (own,))
+    unit = unit_stated(stated)
+    if unit:
+        return Recognised(unit, f"the file states {stated}", (unit,))
     epoch = _epoch(numbers)
     if epoch:
         return Recognised(epoch, f"Unix time, in {epoch}", (epoch,))
     match = _NAMED.search(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name))
-    own = unit_stated(match[1]) if match else ""
-    if own and match and match[0].strip() != name.strip():
-        return Recognised(own, f"the name '{shown(name)}'", (own,))
+    unit = unit_stated(match[1]) if match else ""
+    if unit and match and match[0].strip() != name.strip():
+        return Recognised(unit, f"the name '{shown(name)}'", (unit,))
     return _by_steps(numbers)
 
 
@@ -135,7 +135,9 @@ def stamps(column: pd.Series, where: str) -> Array:
     plain = _read(text, _FORMATS, where)
     if plain is not None:
         return plain
-    candidates = [one for forms in (_DAY_FIRST, _MONTH_FIRST) if (one := _read(text, forms, where)) is not None]
+    candidates = [
+        instants for forms in (_DAY_FIRST, _MONTH_FIRST) if (instants := _read(text, forms, where)) is not None
+    ]
     if len(candidates) == 2 and not np.allclose(candidates[0], candidates[1]):
         raise DataRejected(
             f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month are ambiguous, and the date changes; "
@@ -195,7 +197,7 @@ def clock(numbers: Array, name: str, claimed: str, stated: str, where: str) -> R
     Raises
     ------
     WrongUse
-        Several units are possible, or the one given contradicts the file.
+        Several units are possible, or the given unit contradicts the file.
     """
     recognition = recognised(numbers, name, stated)
     column, step = f"column '{shown(name)}'", typical_step(numbers)

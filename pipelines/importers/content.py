@@ -44,7 +44,7 @@ class Content:
 
 
 _ENDINGS = {
-    **{one: one for one in ("s", "ms", "us", "µs", "ns", "g", "mg", "V", "mV", "LSB")},
+    **{unit: unit for unit in ("s", "ms", "us", "µs", "ns", "g", "mg", "V", "mV", "LSB")},
     **dict.fromkeys(("m_s2", "m_s_2", "mps2"), "m/s^2"),
 }
 
@@ -58,7 +58,7 @@ def unit_in(name: str) -> str:
 
 
 def begins_with(magic: bytes) -> Callable[[bytes], bool]:
-    """What recognises the files of a format by their first bytes."""
+    """A function that recognises the files of a format by their first bytes."""
     return lambda data: data.startswith(magic)
 
 
@@ -67,7 +67,7 @@ INERTIAL = ("acc", "imu")
 
 
 def chosen(groups: Sequence[tuple[str, int]], group: str, where: str, missing: str = "") -> str:
-    """The group of channels to read: the one given, or the only one.
+    """The group of channels to read: the given group, or the only group.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def chosen(groups: Sequence[tuple[str, int]], group: str, where: str, missing: s
         return group
     if len(names) == 1:
         return names[0]
-    likely = sorted(groups, key=lambda one: not any(word in one[0].lower() for word in INERTIAL))
+    likely = sorted(groups, key=lambda pair: not any(word in pair[0].lower() for word in INERTIAL))
     listed = ", ".join(f"'{shown(name)}' ({count} samples)" for name, count in likely[:_MOST_LISTED])
     more = "" if len(groups) <= _MOST_LISTED else f" and {len(groups) - _MOST_LISTED} more"
     raise WrongUse(

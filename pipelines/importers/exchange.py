@@ -126,7 +126,7 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
 
 
 def _refuse_half_an_axis(frame: pd.DataFrame, where: str) -> None:
-    """Refuse a table without an output, and one whose output of an axis has another name."""
+    """Refuse a table without an output, and a table whose output of an axis has another name."""
     axes = output_axes(frame.columns)
     if not axes:
         _require(frame, OUTPUT_COLUMNS, where)
@@ -183,9 +183,9 @@ def _numbers(frame: pd.DataFrame, column: str, where: str) -> Array:
     needed = (*REQUIRED, *OUTPUT_COLUMNS, *FORCE_COLUMNS, *ANGLE_COLUMNS)
     if bad.size and not (column not in needed and bool(np.all(pd.isna(frame[column])))):
         row = int(bad[0])
-        place = f"row {row} (unit {frame['unit'].iloc[row]}), column {shown(column)}"
+        cell = f"row {row} (unit {frame['unit'].iloc[row]}), column {shown(column)}"
         raise DataRejected(
-            f"{where}: {place}: found {shown(frame[column].iloc[row])}, a finite number is needed ({bad.size} such rows); "
+            f"{where}: {cell}: found {shown(frame[column].iloc[row])}, a finite number is needed ({bad.size} such rows); "
             "measure again, or leave the row or the column out"
         )
     return numbers

@@ -41,7 +41,7 @@ class SourceFile:
 
 
 def digest_of(sources: Sequence[SourceFile]) -> str:
-    """The hash of several files as one source."""
+    """The hash of several files that are read as a single source."""
     return hashlib.sha256("".join(source.sha256 for source in sources).encode()).hexdigest()
 
 
@@ -68,10 +68,10 @@ def read_content(path: Path, group: str = "") -> tuple[Content, SourceFile]:
     """
     try:
         about = path.stat()
-        own = not stat.S_ISREG(about.st_mode) or path.is_relative_to("/dev") or path.is_relative_to("/proc")
+        special = not stat.S_ISREG(about.st_mode) or path.is_relative_to("/dev") or path.is_relative_to("/proc")
     except (OSError, ValueError):
         return content_here(path, group)  # which says why it cannot be read
-    given = _bytes(path, MOST_BYTES) if own else None  # a pipe, or a file that only this process has open
+    given = _bytes(path, MOST_BYTES) if special else None  # a pipe, or a file that only this process has open
     limits = limits_for(about.st_size if given is None else len(given))
     return in_reader(limits, path.name, content_here, path, group, given)
 

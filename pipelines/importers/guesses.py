@@ -56,7 +56,7 @@ class Guesses:
     """Guesses of a file.
 
     columns : column → guess · time_unit, output : units with their reasons; empty if unknown · sheet : whether each row is a
-    position, by a label of its own or by its distance from its neighbours · triad : what was seen of the three axes
+    position, by a separate label or by its distance from its neighbours · triad : what was seen of the three axes
     few : axis → column of a device with one axis or two
     """
 
@@ -69,7 +69,7 @@ class Guesses:
 
     @property
     def dwells(self) -> bool:
-        """Whether rows look like dwells: standard deviations beside the means, or a label of its own in each row."""
+        """Whether rows look like dwells: standard deviations beside the means, or a different label in each row."""
         return self.sheet or bool(self.single) or all(self.column(f"sd_{axis}") for axis in "xyz")
 
     @property
@@ -91,7 +91,7 @@ def guesses(content: Content) -> Guesses:
     """Guesses of what the columns of a file mean, by names, units and numbers."""
     table = content.table
     guessed: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
-    numeric = {str(name): one for name in table.columns if (one := _numbers(table[name])) is not None}
+    numeric = {str(name): numbers for name in table.columns if (numbers := _numbers(table[name])) is not None}
     inside = _named(table, numeric, guessed)
     _time(table, numeric, guessed, inside)
     found = triads.Triad() if _single_axis(numeric, guessed) else _axes(content, numeric, guessed)
@@ -121,7 +121,7 @@ def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Gu
 def _of_dwells(numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> None:
     """Note what is read so in a table of dwells alone: the number of samples, the force, and the numbers of the dwells."""
     if not set(FORCE_COLUMNS) & {guess.meaning for guess in guessed.values()}:
-        acting = triads.references({name: one for name, one in numeric.items() if not guessed[name].meaning})
+        acting = triads.references({name: numbers for name, numbers in numeric.items() if not guessed[name].meaning})
         for force, name in zip(FORCE_COLUMNS, acting, strict=False):
             guessed[name] = Guess(force, "its name, and its size is that of gravity")
     for name in named_columns.OF_DWELLS:
@@ -134,7 +134,7 @@ def _of_dwells(numeric: dict[str, Array], guessed: dict[str, Guess], inside: Fla
 
 
 def _sheet(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> bool:
-    """Whether the rows are positions, each with a label of its own; the labels are then those of the dwells."""
+    """Whether the rows are positions, each with a different label; these are then the labels of the dwells."""
     label = _column(guessed, "dwell")
     if label and named_columns.numbers_of_dwells(numeric, inside, [label]):
         return True
@@ -267,7 +267,7 @@ def _others(content: Content, table: pd.DataFrame, numeric: dict[str, Array], gu
 
 
 def _temperature(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]) -> str:
-    """The column of the sensor's temperature: one by its name before others, and one that changes before one that does not."""
+    """The column of the sensor's temperature: named so before others, changing before constant."""
 
     def rank(name: str) -> tuple[bool, bool]:
         return bool(np.nanstd(numeric[name]) > 0.0), bool(_OF_SENSOR.search(name))
@@ -316,7 +316,7 @@ def _output(
     *,
     means: bool,
 ) -> Guess:
-    """The unit of the output; one that the numbers do not settle is a guess with a doubt, which the user has to confirm."""
+    """The unit of the output; a unit that the numbers do not settle is a guess with a doubt, which the user has to confirm."""
     names = [name for axis in "xyz" for name, guess in guessed.items() if guess.meaning == axis]
     if len(names) != 3:
         return Guess("", "")

@@ -101,7 +101,7 @@ def _of_dwells(path: Path, seen: Recognition) -> InspectDocument:
 
 
 def _content_of_dwells(table: pd.DataFrame) -> str:
-    """What the table holds, as a sentence."""
+    """The content of the table as a sentence."""
     names = set(table.columns)
     if set(FORCE_COLUMNS) <= names:
         reference = "the force on each axis"
@@ -171,10 +171,10 @@ class _DynamicGuess(NamedTuple):
 
 
 def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: float | None) -> _DynamicGuess | None:
-    """What a file with a time and two columns, of which one is named as the reference, may be; None for others."""
+    """The command that may import a file with a time, an output and a column named as a reference; None for other files."""
     if rate_hz is None or rate_hz < _SLOWEST_HZ:
         return None
-    other = [name for name, one in guessed.columns.items() if one.meaning != "time"]
+    other = [name for name, guess in guessed.columns.items() if guess.meaning != "time"]
     free = [name for name in other if content.table[name].dtype.kind in "fi"]
     driven = [name for name in free if _REFERENCE.search(name)]
     if len(free) != 2 or len(driven) != 1:

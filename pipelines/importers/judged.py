@@ -52,7 +52,7 @@ def imported_dwells(data: Imported) -> pd.DataFrame:
 
 
 def gravity_of(mapping: Mapping) -> float:
-    """Local gravity at the place of the measurement, g."""
+    """Local gravity where the measurement was made, g."""
     if mapping.norm_g is None:
         raise WrongUse(
             "import: gravity at the place of measurement is needed for this fit and has no default; give "

@@ -1,7 +1,7 @@
-"""Reading of a person's file in a process of its own, with limits of memory and time: one mechanism for commands and pages.
+"""Reading of a person's file in a separate process, with limits of memory and time: one mechanism for commands and pages.
 
 A file decides what its parser does. One that never returns, or takes more memory than the machine has, ends with its process
-and is refused in a sentence. The process is started at the first file, kept for the next, and ends with the one that started it.
+and is refused in a sentence. The process is started at the first file, reused for the next, and ends with its parent process.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ _idle: list[_Reader] = []
 
 
 def start() -> None:
-    """Start the process, so that it imports its libraries while this one imports its own."""
+    """Start the process, so that it imports its libraries while this process imports its libraries."""
     with _lock:
         if not _idle and not _reads_itself():
             _idle.append(_Reader())

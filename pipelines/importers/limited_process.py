@@ -1,6 +1,6 @@
 """The process that reads files of persons: it takes a function and its arguments, and sends the result or the error.
 
-The limit of memory is beyond what the process has when it begins: libraries take address space of their own.
+The limit of memory is beyond what the process has when it begins: libraries take address space too.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def send(sink: Any, value: Any) -> None:
     arrays: list[pickle.PickleBuffer] = []
     head = pickle.dumps(value, 5, buffer_callback=arrays.append)
     pieces: list[Any] = [head, *(array.raw() for array in arrays)]
-    sink.write(struct.pack(f">{len(pieces) + 1}Q", len(pieces), *(len(memoryview(one)) for one in pieces)))
+    sink.write(struct.pack(f">{len(pieces) + 1}Q", len(pieces), *(len(memoryview(piece)) for piece in pieces)))
     for piece in pieces:
         sink.write(piece)
     sink.flush()
@@ -135,7 +135,7 @@ def _limit(memory: int, seconds: int) -> None:
 
 @contextmanager
 def reserving(size: int) -> Generator[None]:
-    """More address space for a library that reserves so many bytes and uses few; nothing where no reading is limited."""
+    """A block with more address space, for a library that reserves many bytes and uses few; without limits it does nothing."""
     limits = resource.getrlimit(resource.RLIMIT_AS) if is_reader() else (resource.RLIM_INFINITY,) * 2
     if limits[0] == resource.RLIM_INFINITY:
         yield

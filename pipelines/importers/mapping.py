@@ -79,7 +79,7 @@ class Units(BaseModel):
 
 
 class Mapping(BaseModel):
-    """How a foreign file is read."""
+    """The mapping of a foreign file: meaning of its columns, units, and the treatment of gaps and faults."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     columns: dict[str, str]
@@ -204,7 +204,7 @@ class Mapping(BaseModel):
 
     @property
     def likely_slips(self) -> dict[str, tuple[str, ...]]:
-        """Covariates whose names are close to known ones, with these: possibly misspelt, but allowed."""
+        """Covariates whose names are close to known names, with these names: possibly misspelt, but allowed."""
         similar = {name: close_matches(name, KNOWN) for name in self.columns if name not in KNOWN and len(name) > 1}
         return {name: close for name, close in similar.items() if close}
 

@@ -31,7 +31,7 @@ def serials(table: pd.DataFrame) -> str:
     for name in (str(column) for column in table.columns if _SERIAL.match(str(column))):
         distinct = table[name].unique()
         few = len(distinct) == 1 or 2 * len(distinct) <= len(table)
-        if few and table[name].notna().all() and not all(output_unit(str(one)) for one in distinct):
+        if few and table[name].notna().all() and not all(output_unit(str(value)) for value in distinct):
             return name
     return ""
 
@@ -45,7 +45,7 @@ def of_one_unit(table: pd.DataFrame, serial: str) -> Flags:
 
 
 def numbers_of_dwells(numeric: Mapping[str, Array], inside: Flags, free: Collection[str]) -> str:
-    """The column among the free ones that numbers the dwells of each unit, one in each row; empty if there is none."""
+    """The free column that numbers the dwells of each unit, one dwell in each row; empty if no column does."""
     for name in free:
         steps = np.diff(numeric[name])[inside] if name in numeric and _NUMBER.match(name) else np.zeros(0)
         if steps.size and bool(np.all((steps >= 1.0) & (steps == np.rint(steps)))):

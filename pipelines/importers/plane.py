@@ -137,11 +137,11 @@ def _errors(dwells: pd.DataFrame, output: Array) -> Array:
     alike = np.full(output.shape, 1e-6 * float(np.ptp(output)))
     if not {*SPREAD, "n"} <= set(dwells.columns):
         return alike
-    own = dwells[SPREAD].to_numpy(dtype=np.float64) / np.sqrt(dwells["n"].to_numpy(dtype=np.float64))[:, None]
-    typical = np.median(own, axis=0)
+    errors = dwells[SPREAD].to_numpy(dtype=np.float64) / np.sqrt(dwells["n"].to_numpy(dtype=np.float64))[:, None]
+    typical = np.median(errors, axis=0)
     if not np.all(typical > 0.0):
         return alike
-    return np.clip(np.where(np.isfinite(own), own, typical), typical / 20.0, typical * 20.0)
+    return np.clip(np.where(np.isfinite(errors), errors, typical), typical / 20.0, typical * 20.0)
 
 
 def _verdict(fit: PlaneFit) -> tuple[bool | None, str]:
@@ -192,8 +192,8 @@ def _line(fit: PlaneFit, axis: int, unit: str) -> str:
             for c, k in enumerate((i, j))
         ]
         return f"{bias}, with the tilt of the axis of rotation; couplings {', '.join(parts)}"
-    own, other = (0, 1) if axis == i else (1, 0)
-    scale = f"scale {fit.response[axis, own] / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
+    along, other = (0, 1) if axis == i else (1, 0)
+    scale = f"scale {fit.response[axis, along] / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
     if fit.response_error[axis, other] == 0.0:
         return f"{bias}, {scale}"
     cross = f"K{AXES[axis]}{AXES[j if axis == i else i]} {fit.response[axis, other]:.4g}"

@@ -43,7 +43,7 @@ _KEYS = (
 class Proposal:
     """Keys of the mapping of an import, and the fit (empty: none); what was assumed, and remarks; count of stops.
 
-    places : positions that lie apart, up to what a fit needs
+    places : number of positions that lie apart, up to what a fit needs
     """
 
     keys: dict[str, Any]
@@ -141,26 +141,26 @@ def for_fit(
         f"local gravity not stated: {STANDARD_GRAVITY_M_S2:.5f} m/s² taken; scale factors are relative to it "
         "(--set local_gravity_m_s2=M/S2)"
     )
-    own = {"local_gravity_m_s2": STANDARD_GRAVITY_M_S2}
+    standard = {"local_gravity_m_s2": STANDARD_GRAVITY_M_S2}
     sphere = guessed.triad.sphere
     if sphere is not None and sphere.still and duration_s is not None:
-        return _still(keys | own, means, duration_s, heat, [*assumed, gravity])
+        return _still(keys | standard, means, duration_s, heat, [*assumed, gravity])
     places = 0 if means is None else positions(means)
     if places >= FEWEST_OF_NORM:
-        return Proposal(keys | own, "norm", (*assumed, gravity))
+        return Proposal(keys | standard, "norm", (*assumed, gravity))
     poses, askew = ({}, "") if means is None or sphere is None else _six_faces(means, labels, sphere.centre)
     if poses:
         told = "six faces taken as vertical: a tilt of 1° is 17 mg in the bias"
-        return Proposal(keys | {"poses": poses} | own, "faces", (*assumed, gravity, told))
+        return Proposal(keys | {"poses": poses} | standard, "faces", (*assumed, gravity, told))
     return Proposal(keys, "", tuple(assumed), (askew,) if askew else (), 0 if means is None else len(means), places)
 
 
 def positions(means: Array) -> int:
-    """How many of the stops (k, 3) lie apart, at most as many as a fit needs: a pose that comes again adds no shape."""
+    """Number of the stops (k, 3) that lie apart, at most as many as a fit needs: a repeated pose determines nothing new."""
     size = 0.5 * float(np.linalg.norm(np.ptp(means, axis=0)))
     apart: list[Array] = []
     for mean in means:
-        if all(np.linalg.norm(mean - one) > _APART * size for one in apart):
+        if all(np.linalg.norm(mean - other) > _APART * size for other in apart):
             apart.append(mean)
         if len(apart) == FEWEST_OF_NORM:
             break

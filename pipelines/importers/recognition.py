@@ -57,9 +57,9 @@ class Recognition:
             return None
         if self.guessed.dwells:
             named = self.guessed.column("dwell")
-            whole = bool(named) and len(self.content.table) == len(self.output)
-            own = [f"dwell {k}" for k in range(len(self.output))]
-            labels = self.content.table[named].astype(str).tolist() if whole else own
+            labelled = bool(named) and len(self.content.table) == len(self.output)
+            numbered = [f"dwell {k}" for k in range(len(self.output))]
+            labels = self.content.table[named].astype(str).tolist() if labelled else numbered
             return self._proposal(self.keys, self.output, labels)
         time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
         stops = self.stops or _stops(self.output, time, self.guessed.output.meaning, self.joints)
@@ -127,35 +127,35 @@ def of_content(
     guessed = guesses.guesses(content)
     time, open_ = _time(content, guessed)
     output = _output(content, guessed)
-    whole = np.ones(len(content.table), dtype=bool) if output is None else np.isfinite(output).all(axis=1)
+    finite = np.ones(len(content.table), dtype=bool) if output is None else np.isfinite(output).all(axis=1)
     if time is not None:
-        whole &= np.isfinite(time)
-    kept = None if output is None else output[whole]
-    own = None if time is None else time[whole]
-    steps = np.diff(own) if own is not None else np.zeros(0)
+        finite &= np.isfinite(time)
+    samples = None if output is None else output[finite]
+    clock = None if time is None else time[finite]
+    steps = np.diff(clock) if clock is not None else np.zeros(0)
     gaps = int(np.count_nonzero(steps > gap_limit(steps)))
-    faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
-    joints = tuple(np.searchsorted(np.flatnonzero(whole), breaks).tolist())
+    faults = sample_faults.look(samples) if samples is not None and len(samples) > 3 and not guessed.dwells else None
+    joints = tuple(np.searchsorted(np.flatnonzero(finite), breaks).tolist())
     stops = (
-        _stops(kept, own, guessed.output.meaning, joints)
-        if kept is not None and own is not None and not guessed.dwells
+        _stops(samples, clock, guessed.output.meaning, joints)
+        if samples is not None and clock is not None and not guessed.dwells
         else None
     )
     named = guessed.column("dwell")
     labels = None
-    if named and kept is not None and not guessed.dwells:
-        labels = tuple(np.asarray(content.table[named].astype(str), dtype=np.str_)[whole].tolist())
+    if named and samples is not None and not guessed.dwells:
+        labels = tuple(np.asarray(content.table[named].astype(str), dtype=np.str_)[finite].tolist())
     keys = columns_and_units(content, guessed, paths[0])
-    if stops is not None and kept is not None and labels is None:  # what marks the dwells is not searched for
-        keys = _with_stops(keys, kept, stops)
+    if stops is not None and samples is not None and labels is None:  # what marks the dwells is not searched for
+        keys = _with_stops(keys, samples, stops)
     for more in stated:
         keys |= more
-    keys |= {"gaps": "split"} if gaps or not bool(whole.all()) else {}
+    keys |= {"gaps": "split"} if gaps or not bool(finite.all()) else {}
     keys |= {"faulty": "leave-out"} if faults else {}
-    open_ += _open(guessed, kept)
+    open_ += _open(guessed, samples)
     return Recognition(
-        tuple(paths), content, source, guessed, False, own, kept, gaps, _rate(own), stops, faults, tuple(open_), keys, labels,
-        joints,
+        tuple(paths), content, source, guessed, False, clock, samples, gaps, _rate(clock), stops, faults, tuple(open_), keys,
+        labels, joints,
     )  # fmt: skip
 
 
@@ -163,7 +163,7 @@ _OUTPUT_UNIT = "the unit of the output: --unit-of output=g|mg|m/s^2|V|mV|LSB"
 
 
 def _open(guessed: Guesses, output: Array | None) -> list[str]:
-    """What the file does not state of its outputs."""
+    """The facts on its outputs that the file leaves open, a sentence each."""
     open_ = [guessed.triad.doubt] if guessed.triad.doubt else []
     if output is None:
         if guessed.single and not guessed.output.meaning:
@@ -255,7 +255,7 @@ def _stops(output: Array, time: Array, unit: str, joints: Sequence[int] = ()) ->
 
 
 def _edges(time: Array, joints: Sequence[int] = ()) -> list[int]:
-    """The samples before which time has a gap or another file begins, with the first and one past the last."""
+    """The samples before which time has a gap or another file begins, with the first sample and the index past the last."""
     steps = np.diff(time)
     return sorted({0, *(np.flatnonzero(steps > gap_limit(steps)) + 1).tolist(), *joints, len(time)})
 

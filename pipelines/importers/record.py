@@ -62,9 +62,9 @@ def imported(
     """
     content = content or Content(table)
     columns = _columns(table, mapping, where)
-    kept, columns, dropped = _with_numbers(columns, mapping, where, content)
-    left_out_before = {int(k) + 1 for k in np.flatnonzero(np.diff(kept) > 1)}
-    breaks = sorted({int(np.searchsorted(kept, k)) for k in breaks} | left_out_before)
+    rows, columns, dropped = _with_numbers(columns, mapping, where, content)
+    left_out_before = {int(k) + 1 for k in np.flatnonzero(np.diff(rows) > 1)}
+    breaks = sorted({int(np.searchsorted(rows, k)) for k in breaks} | left_out_before)
     raw = np.column_stack([values.finite(columns[axis], where, content) for axis in mapping.axes])
     raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs[: len(mapping.axes)]]
     remarks = (*content.remarks, *dropped)
@@ -133,25 +133,25 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
 def _with_numbers(
     columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content
 ) -> tuple[Index, dict[str, pd.Series], tuple[str, ...]]:
-    """Rows that are kept (k,), the columns with these rows, and a remark on the others, which lack a number."""
+    """Indices (k,) of the rows that have every number, the columns with these rows, and a remark on the others."""
     count = len(next(iter(columns.values())))
     if mapping.gaps == "refuse":
         return np.arange(count), columns, ()
-    whole = np.ones(count, dtype=bool)
+    complete = np.ones(count, dtype=bool)
     for meaning, column in columns.items():
         stamps = column.dtype.kind in "mM" or (meaning == "time" and clocks.is_stamps(column))
         if meaning in {"unit", "dwell"} or stamps:
-            whole &= column.notna().to_numpy()
+            complete &= column.notna().to_numpy()
         else:
-            whole &= np.isfinite(values.as_numbers(column, where, flags=meaning not in MEANINGS))
-    kept = np.flatnonzero(whole)
-    if not kept.size:
+            complete &= np.isfinite(values.as_numbers(column, where, flags=meaning not in MEANINGS))
+    rows = np.flatnonzero(complete)
+    if not rows.size:
         raise DataRejected(f"{where}: no row has a number in every mapped column, one is needed at least; check --map")
-    if kept.size == count:
-        return kept, columns, ()
-    first = content.row(int(np.flatnonzero(~whole)[0]))
-    remark = f"{count - kept.size} of {count} rows without a number left out, the first is {first}; dwells end there"
-    return kept, {name: one.iloc[kept].reset_index(drop=True) for name, one in columns.items()}, (remark,)
+    if rows.size == count:
+        return rows, columns, ()
+    first = content.row(int(np.flatnonzero(~complete)[0]))
+    remark = f"{count - rows.size} of {count} rows without a number left out, the first is {first}; dwells end there"
+    return rows, {name: column.iloc[rows].reset_index(drop=True) for name, column in columns.items()}, (remark,)
 
 
 def _twice(time: Array, raw: Array) -> tuple[str, ...]:
@@ -168,8 +168,8 @@ def _twice(time: Array, raw: Array) -> tuple[str, ...]:
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
     if "unit" in columns:
         serials = ["" if pd.isna(value) else values.text(value) for value in columns["unit"].tolist()]
-        place = f"{where}: column '{columns['unit'].name}'"
-        refuse_unusable_serials(dict.fromkeys(serials), place, "correct it in the file")
+        subject = f"{where}: column '{columns['unit'].name}'"
+        refuse_unusable_serials(dict.fromkeys(serials), subject, "correct it in the file")
         return serials
     if not mapping.unit:
         raise WrongUse(f"{where}: no unit is mapped, a serial number is needed; give --units SN")

@@ -175,7 +175,7 @@ def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataF
 
 
 def _drawn(dwells: int, count: int) -> np.ndarray:
-    """Places of ``count`` of ``dwells``, one in each stretch, neither the first nor the last."""
+    """Indices of ``count`` of ``dwells``: one in each of as many equal stretches, neither the first nor the last dwell."""
     rng = np.random.default_rng(_SEED + 1000 * dwells + count)
     edges = np.linspace(1, dwells - 1, count + 1)
     first = np.ceil(edges[:-1]).astype(np.int64)

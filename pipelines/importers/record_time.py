@@ -53,7 +53,7 @@ def seconds(
     if dwells:
         return clock
     time = clock.seconds
-    if "dwell" in columns:  # dwells may have been recorded one by one, each with a clock of its own
+    if "dwell" in columns:  # dwells may have been recorded separately, each with its clock
         labels = columns["dwell"].astype(str).tolist()
         backwards(time, labels, where, together=False)
         return _continued(clock)

@@ -1,4 +1,4 @@
-"""Messages of ROS as columns: nested fields by their path, arrays by element, the time of the header where there is one."""
+"""Messages of ROS as columns: nested fields by their path, arrays by element, the time of the header where it is stamped."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ def content_of(rows: Sequence[tuple[int, dict[str, float]]], kind: str, name: st
     rows : time of the recorder, ns, and numbers of each message
     kind : type of the messages
     """
-    if not rows or not any(own for _, own in rows):
+    if not rows or not any(numbers for _, numbers in rows):
         raise DataRejected(
             f"{name}: topic {topic} ({kind}) has no numbers, a topic with numbers is needed; name another with --set group=NAME"
         )
-    stamps = [int(own.pop(STAMP, 0)) for _, own in rows]
+    stamps = [int(numbers.pop(STAMP, 0)) for _, numbers in rows]
     stamped = min(stamps) > 0
     # ns since 1970: no float holds them
     when = np.array(stamps if stamped else [logged for logged, _ in rows], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Samples that an axis repeats, and torn words: refused, left out or kept, by the mapping."""
+"""Samples that an axis repeats, and torn words: refused, left out or used, by the mapping."""
 
 from __future__ import annotations
 
@@ -35,22 +35,23 @@ class SampleFaults:
     def sentences(self, time: Array) -> list[str]:
         """The faults as text."""
         texts = [
-            f"axis {AXES[one.axis]} is constant for {one.count} samples from row {one.start + 1} on ({time[one.start]:.6g} s)"
-            for one in sorted(self.frozen, key=lambda one: -one.count)[:_MOST_LISTED]
+            f"axis {AXES[stretch.axis]} is constant for {stretch.count} samples from row {stretch.start + 1} on "
+            f"({time[stretch.start]:.6g} s)"
+            for stretch in sorted(self.frozen, key=lambda stretch: -stretch.count)[:_MOST_LISTED]
         ]
         more = len(self.frozen) - _MOST_LISTED
         texts += [f"and {more} more such stretches"] if more > 0 else []
         return texts + [
-            f"axis {AXES[one.axis]} has torn words: {100.0 * one.share:.3g} % of its resting samples deviate by "
-            f"±{', ±'.join(map(str, one.offsets))} steps of its resolution, from row {int(one.rows.min()) + 1} on"
-            for one in self.torn
+            f"axis {AXES[fault.axis]} has torn words: {100.0 * fault.share:.3g} % of its resting samples deviate by "
+            f"±{', ±'.join(map(str, fault.offsets))} steps of its resolution, from row {int(fault.rows.min()) + 1} on"
+            for fault in self.torn
         ]
 
     def rows(self, time: Array) -> list[SampleFaultDocument]:
         """The faults for JSON."""
         found: list[tuple[FaultName, int, int, int, tuple[int, ...]]] = [
-            *(("stuck_output", one.axis, one.start, one.count, ()) for one in self.frozen),
-            *(("torn_words", one.axis, int(one.rows.min()), one.rows.size, one.offsets) for one in self.torn),
+            *(("stuck_output", fault.axis, fault.start, fault.count, ()) for fault in self.frozen),
+            *(("torn_words", fault.axis, int(fault.rows.min()), fault.rows.size, fault.offsets) for fault in self.torn),
         ]
         return [
             {"fault": fault, "axis": AXES[axis], "first_row": first + 1, "samples": count, "start_s": float(time[first]),
@@ -63,10 +64,10 @@ def look(output: Array) -> SampleFaults:
     """The faults of the samples of a record (n, 3)."""
     frozen, torn = tuple(record_faults.frozen(output)), tuple(record_faults.torn(output))
     bad = np.zeros(len(output), dtype=bool)
-    for one in frozen:
-        bad[one.start : one.stop] = True
-    for one in torn:
-        bad[one.rows] = True
+    for stretch in frozen:
+        bad[stretch.start : stretch.stop] = True
+    for fault in torn:
+        bad[fault.rows] = True
     return SampleFaults(frozen, torn, bad)
 
 
@@ -75,21 +76,21 @@ def mended(output: Array, faults: SampleFaults, bad: Flags) -> Array:
     if not bad.any() or not faults.torn:
         return output
     clean = output.copy()
-    for one in faults.torn:
-        clean[one.rows, one.axis] = record_faults.running_median(output[:, one.axis])[one.rows]
+    for fault in faults.torn:
+        clean[fault.rows, fault.axis] = record_faults.running_median(output[:, fault.axis])[fault.rows]
     return clean
 
 
 def without_short(intervals: Stretches, record: Index) -> tuple[Stretches, Index, tuple[str, ...]]:
     """The dwells that keep at least half of their samples, renumbered, and a remark on the others."""
-    kept = [k for k, (a, b) in enumerate(intervals.spans) if 2 * np.count_nonzero(record[a:b]) > b - a]
-    if len(kept) == len(intervals):
+    sound = [k for k, (a, b) in enumerate(intervals.spans) if 2 * np.count_nonzero(record[a:b]) > b - a]
+    if len(sound) == len(intervals):
         return intervals, record, ()
     numbers = np.zeros(len(intervals) + 1, dtype=np.int64)
-    numbers[np.array(kept, dtype=np.int64) + 1] = np.arange(len(kept)) + 1
-    gone = [intervals.labels[k] for k in range(len(intervals)) if k not in set(kept)]
+    numbers[np.array(sound, dtype=np.int64) + 1] = np.arange(len(sound)) + 1
+    gone = [intervals.labels[k] for k in range(len(intervals)) if k not in set(sound)]
     remark = f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_LISTED])}"
-    return intervals.only(kept), numbers[record], (remark,)
+    return intervals.only(sound), numbers[record], (remark,)
 
 
 def sound_dwells(
@@ -126,7 +127,7 @@ def sound_dwells(
 
 
 def refuse_or_remark(faults: SampleFaults, output: Array, time: Array, mapping: Mapping, where: str) -> tuple[str, ...]:
-    """Remarks on the faults that are left out or kept.
+    """Remarks on the faulty samples that are left out or used.
 
     Raises
     ------
@@ -136,9 +137,9 @@ def refuse_or_remark(faults: SampleFaults, output: Array, time: Array, mapping: 
     if not faults:
         return ()
     words = "; ".join(faults.sentences(time))
-    whole = [one for one in faults.frozen if one.count == len(output)]
-    if whole and mapping.faulty != "keep":
-        axis = AXES[whole[0].axis]
+    constant = [stretch for stretch in faults.frozen if stretch.count == len(output)]
+    if constant and mapping.faulty != "keep":
+        axis = AXES[constant[0].axis]
         raise DataRejected(
             f"{where}: axis {axis} never changes in {len(output)} samples while another axis does; map another column as "
             f"{axis}, repair the sensor's channel, or import it all the same with --set faulty=keep"

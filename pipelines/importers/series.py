@@ -107,12 +107,12 @@ def _recognised(path: Path, columns: Sequence[str]) -> tuple[str, str, Sequence[
 
 
 def series_of_run(run: Run, record: int | None) -> EvenSeries:
-    """The longest stretch at rest of an import's samples, or the one with the given number.
+    """The longest stretch at rest of an import's samples, or the stretch with the given number.
 
     Raises
     ------
     WrongUse
-        The run has no samples of its own, or no such stretch.
+        The run has no samples, or no such stretch.
     """
     if "samples" not in run.tables():
         raise WrongUse(
@@ -124,11 +124,11 @@ def series_of_run(run: Run, record: int | None) -> EvenSeries:
         known = ", ".join(map(str, sorted(counts.index)[:8])) or "none"
         raise WrongUse(f"run {run.id}: no stretch at rest has the number {record}; there are {known}")
     chosen = int(counts.index[0]) if record is None else record
-    own = samples[samples["record"] == chosen]
+    stretch = samples[samples["record"] == chosen]
     where = f"run {run.id}, stretch {chosen}"
-    rate = _rate(own["time_s"].to_numpy(dtype=np.float64), where)
+    rate = _rate(stretch["time_s"].to_numpy(dtype=np.float64), where)
     unit = str(run.table("dwells")["out_unit"].iloc[0]) if "dwells" in run.tables() else ""
-    values = np.stack([own[axis].to_numpy(dtype=np.float64) for axis in AXES])
+    values = np.stack([stretch[axis].to_numpy(dtype=np.float64) for axis in AXES])
     return EvenSeries(AXES, values, rate, unit, where)
 
 

@@ -64,8 +64,8 @@ def _after(contents: Sequence[Content], names: list[str], time: str) -> tuple[Co
         if shifted:
             remarks.append(f"{name}: its clock restarts; it is continued after {names[len(tables) - 1]}")
         tables.append(table)
-    whole = all(one.lines for one in contents)
-    lines = tuple(part for one in contents for part in one.lines) if whole else ()
+    numbered = all(content.lines for content in contents)
+    lines = tuple(part for content in contents for part in content.lines) if numbered else ()
     table = pd.concat(tables, ignore_index=True)
     return replace(first, table=table, remarks=tuple(remarks), lines=lines), tuple(breaks[1:])
 
@@ -97,17 +97,17 @@ def _beside(contents: Sequence[Content], names: list[str], time: str) -> Content
         for column, data in content.table.items():
             if clocked and column == label:
                 continue
-            own = str(column) if str(column) not in columns else f"{number}:{column}"
-            columns[own] = _at(first.table[label], content.table[label], data, name) if clocked else data
-            units |= {own: content.units[str(column)]} if str(column) in content.units else {}
+            heading = str(column) if str(column) not in columns else f"{number}:{column}"
+            columns[heading] = _at(first.table[label], content.table[label], data, name) if clocked else data
+            units |= {heading: content.units[str(column)]} if str(column) in content.units else {}
         how = f"read at the times of {names[0]}, linear in between" if clocked else "row by row"
         remarks += [*content.remarks, f"columns of {name} {how}"]
     return replace(first, table=pd.DataFrame(columns), units=units, remarks=tuple(remarks), lines=())
 
 
-def _at(times: pd.Series, own: pd.Series, data: pd.Series, where: str) -> Array:
+def _at(times: pd.Series, clock: pd.Series, data: pd.Series, where: str) -> Array:
     """A column read at other times; NaN outside its own times."""
-    at, given = _instants(times, where), _instants(own, where)
+    at, given = _instants(times, where), _instants(clock, where)
     if np.any(np.diff(given) < 0.0):
         raise DataRejected(f"{where}: time runs back, it must not; sort the rows")
     numbers = values.as_numbers(data, where)
@@ -117,7 +117,7 @@ def _at(times: pd.Series, own: pd.Series, data: pd.Series, where: str) -> Array:
 
 
 def _instants(column: pd.Series, where: str) -> Array:
-    """Numbers that grow with time, the same for the same instant in every file."""
+    """Numbers that grow with time and are equal for the same instant in every file."""
     if column.dtype.kind in "fiu":
         return column.to_numpy(dtype=np.float64)
     moments = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")

@@ -27,7 +27,7 @@ TEMPERATURE = {
 
 
 def output_unit(text: str) -> str:
-    """A unit of the output in the name of the mapping; empty if unknown. G is gravity, g the same."""
+    """A unit of the output in the name of the mapping; empty if unknown. Both G and g are gravity."""
     return OUTPUT.get(text.strip().lower(), "")
 
 

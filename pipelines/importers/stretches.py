@@ -48,7 +48,7 @@ _AT_REST = 0.5
 
 @dataclass(frozen=True)
 class Stretches:
-    """Static stretches: first and one past the last sample, and label of each; remarks on how they were found."""
+    """Static stretches: first sample and index past the last, and label of each; remarks on how they were found."""
 
     spans: tuple[tuple[int, int], ...]
     labels: tuple[str, ...]
@@ -153,7 +153,7 @@ def _best_stops(output: Array, time: Array, edges: Sequence[int], gravity: float
     best = _longest(clean) if clean else None
     if best and (len(best.found) >= _ENOUGH or not any(stops.several for stops in fit)):
         return best
-    # a hand that rests for a moment shakes little less than one that moves: stricter limits part what it runs together
+    # a hand that rests for a moment shakes little less than a moving hand: stricter limits part what it runs together
     strict = [
         _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")), gravity)
         for window, sd in quiet.items()
@@ -216,21 +216,21 @@ def _without_handled_ends(intervals: Stretches, output: Array, time: Array) -> S
     """The blocks of a still record without those at its ends in which a hand still holds the sensor; a remark on these."""
     scatter = np.array([float(np.linalg.norm(output[a:b].std(axis=0))) for a, b in intervals.spans])
     calm = np.flatnonzero(scatter <= HANDLED * np.median(scatter))
-    kept = intervals.only(range(int(calm[0]), int(calm[-1]) + 1)) if calm.size else intervals
-    if len(kept) == len(intervals):
+    still = intervals.only(range(int(calm[0]), int(calm[-1]) + 1)) if calm.size else intervals
+    if len(still) == len(intervals):
         return intervals
-    remark = handling_left_out(kept, time, (bool(calm[0] > 0), bool(calm[-1] + 1 < len(intervals))))
-    return replace(kept, remarks=(remark,))
+    remark = handling_left_out(still, time, (bool(calm[0] > 0), bool(calm[-1] + 1 < len(intervals))))
+    return replace(still, remarks=(remark,))
 
 
-def handling_left_out(kept: Stretches, time: Array, ends: tuple[bool, bool]) -> str:
+def handling_left_out(still: Stretches, time: Array, ends: tuple[bool, bool]) -> str:
     """A sentence on the motion before the first stretch and after the last, which no dwell has; empty where there is none.
 
     Parameters
     ----------
     ends : whether there is such motion at the beginning, and at the end
     """
-    first, last, end = (float(time[k] - time[0]) for k in (kept.spans[0][0], kept.spans[-1][1] - 1, len(time) - 1))
+    first, last, end = (float(time[k] - time[0]) for k in (still.spans[0][0], still.spans[-1][1] - 1, len(time) - 1))
     spans = [f"0 to {first:.1f} s"] if ends[0] else []
     spans += [f"{last:.1f} to {end:.1f} s"] if ends[1] else []
     return f"handling at the ends left out: {' and '.join(spans)}" if spans else ""
@@ -275,20 +275,20 @@ def _at_rest(intervals: Stretches, output: Array, time: Array, gravity: float | 
     # a mean in counts has an offset of any size: between positions it cancels
     means = np.array([output[a:b].mean(axis=0) for a, b in intervals.spans])
     size = float(np.linalg.norm(means.std(axis=0))) if gravity is None else gravity
-    kept = [
+    resting = [
         k
         for k, (a, b) in enumerate(intervals.spans)
         if not _is_motion(output[a:b], float(time[b - 1] - time[a]), size, is_gravity=gravity is not None)
     ]
-    if len(kept) == len(intervals):
+    if len(resting) == len(intervals):
         return intervals
     samples = np.array([b - a for a, b in intervals.spans])
-    if (
-        2 * samples[kept].sum() <= samples.sum()
-    ):  # the limit divides nothing: what is left is the calmer part of a motion
-        kept = []
-    remark = f"{len(intervals) - len(kept)} of {len(intervals)} stretches are no rest and were left out: more scatter than noise"
-    return replace(intervals.only(kept), remarks=(*intervals.remarks, remark))
+    # the limit divides nothing: what is left is the calmer part of a motion
+    if 2 * samples[resting].sum() <= samples.sum():
+        resting = []
+    count = len(intervals) - len(resting)
+    remark = f"{count} of {len(intervals)} stretches are no rest and were left out: more scatter than noise"
+    return replace(intervals.only(resting), remarks=(*intervals.remarks, remark))
 
 
 def _put_down(found: Stretches, output: Array, time: Array, gravity: float | None) -> Stretches:
@@ -333,9 +333,9 @@ def _is_motion(x: Array, duration_s: float, size: float, *, is_gravity: bool) ->
 
 def _turns(x: Array, duration_s: float, size: float) -> bool:
     """Whether the mean of a stretch moves through it, faster than a temperature moves it and than its scatter allows."""
-    place = np.linspace(-0.5, 0.5, len(x))
-    slope = 12.0 * (place @ x) / (len(x) + 2)  # over the stretch; Σ place² = n/12 within 1/n
-    left = x - x.mean(axis=0) - place[:, None] * slope
+    position = np.linspace(-0.5, 0.5, len(x))
+    slope = 12.0 * (position @ x) / (len(x) + 2)  # over the stretch; Σ place² = n/12 within 1/n
+    left = x - x.mean(axis=0) - position[:, None] * slope
     scatter = float(np.sqrt(np.sum(np.mean(left**2, axis=0))))
     turned = float(np.linalg.norm(slope))
     clear = turned > _TURN_SIGMAS * scatter * np.sqrt(12.0 / len(x))

@@ -42,7 +42,7 @@ class Layout:
     names : of the columns; empty if no line names them
     header : index of the line with the names; −1 if there is none, or if it is a comment
     integers : whether the names are only the numbers 0, 1, 2, …
-    units : of the columns by a line of their own below the names; empty otherwise
+    units : of the columns, from a separate line below the names; empty otherwise
     width : count of fields, a last empty one not counted
     trailing : whether every line ends with a divider
     """
@@ -94,21 +94,21 @@ def layout(lines: Sequence[str], filled: Sequence[int]) -> Layout | None:
     trailing = width > 1 and all(not f[-1] for f in (fields_of(s, divider) for s in sample) if len(f) == width)
     numeric = _numeric_columns(sample, divider, decimal, width)
     first = _first_row(lines, filled, divider, decimal, width, numeric)
-    place = filled.index(first) if first < len(lines) else len(filled)
+    index = filled.index(first) if first < len(lines) else len(filled)
     header, names, units, integers = -1, (), (), False
-    above = [fields_of(lines[k], divider) for k in filled[max(0, place - 2) : place]][::-1]
+    above = [fields_of(lines[k], divider) for k in filled[max(0, index - 2) : index]][::-1]
     if above and _is_header(above[0], width, decimal, trailing=trailing):
-        header, names = filled[place - 1], tuple(above[0])
+        header, names = filled[index - 1], tuple(above[0])
         named = [row for row in above[1:] if _is_header(row, width, decimal, trailing=trailing)]
         if named and _are_units(above[0], named[0]):
-            header, names, units = filled[place - 2], tuple(above[1]), tuple(above[0])
-    elif _only_numbered([fields_of(lines[k], divider) for k in filled[place : place + 2]]):
+            header, names, units = filled[index - 2], tuple(above[1]), tuple(above[0])
+    elif _only_numbered([fields_of(lines[k], divider) for k in filled[index : index + 2]]):
         header, names, integers = first, tuple(fields_of(lines[first], divider)), True
-        first = filled[place + 1]
+        first = filled[index + 1]
     elif not above or first > 0:
         names = _commented(lines, first, divider, width)
-    kept = width - 1 if trailing else width
-    return Layout(divider, decimal, first, names[:kept], header, integers, units[:kept], kept, trailing)
+    count = width - 1 if trailing else width
+    return Layout(divider, decimal, first, names[:count], header, integers, units[:count], count, trailing)
 
 
 def _sampled(filled: list[str]) -> list[str]:
@@ -146,19 +146,19 @@ def _numeric_columns(sample: Sequence[str], divider: str, decimal: str, width: i
 def _first_row(
     lines: Sequence[str], filled: Sequence[int], divider: str, decimal: str, width: int, numeric: list[bool]
 ) -> int:
-    """The first line of the table: like the sampled ones, with the broken rows right above it, which are rows too."""
+    """The first line of the table: like the sampled rows, with the broken rows right above it, which are rows too."""
     if not any(numeric):
         return filled[1] if len(filled) > 1 else len(lines)  # names alone
-    alike = (place for place, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
-    place = next(alike, len(filled) - 1)
+    alike = (index for index, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
+    index = next(alike, len(filled) - 1)
     last_number = max(k for k, here in enumerate(numeric) if here)
-    while place > 0:
-        row = fields_of(lines[filled[place - 1]], divider)
+    while index > 0:
+        row = fields_of(lines[filled[index - 1]], divider)
         short = last_number < len(row) < width  # without its last fields, which hold no numbers
         if not (len(row) == width or short) or not any(is_number(word, decimal) for word in row):
             break
-        place -= 1
-    return filled[place]
+        index -= 1
+    return filled[index]
 
 
 def _is_row(row: list[str], decimal: str, numeric: list[bool]) -> bool:
@@ -178,7 +178,7 @@ def _is_header(row: list[str], width: int, decimal: str, *, trailing: bool) -> b
 
 
 def _are_units(row: list[str], above: list[str]) -> bool:
-    """Whether a line below the names holds units: shorter words, often the same, and the names all different."""
+    """Whether a line below the names holds units: shorter words, often repeated, while the names are all different."""
     words = [word.strip("[]()") for word in row if word]
     return (
         len(set(above)) == len(above)

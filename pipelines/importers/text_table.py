@@ -92,14 +92,14 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     stated = detected.units if any(detected.units) else map(unit_in, labels)
     units = {label: unit.strip("[]() ") for label, unit in zip(labels, stated, strict=False) if unit}
     remarks = (*_remarks(detected, lines, encoding), *([grouped] if grouped else []))
-    # a line break inside a quoted field, or one that the parser joins, moves all rows behind it
-    whole = len(lines) == len(text.splitlines()) and len(rows) == len(table)
+    # a line break inside a quoted field, or lines that the parser joins, moves all rows behind it
+    line_by_line = len(lines) == len(text.splitlines()) and len(rows) == len(table)
     interval, stated_by = _stated_interval(lines[: detected.first])
-    return Content(table, (*remarks, *stated_by), units, interval, ((where, rows),) if whole else ())
+    return Content(table, (*remarks, *stated_by), units, interval, ((where, rows),) if line_by_line else ())
 
 
 def _stated_interval(lines: Sequence[str]) -> tuple[float | None, tuple[str, ...]]:
-    """The interval of samples by the one rate, Hz, that lines before the table state, and a remark; None if two differ."""
+    """The interval of samples by the rate, Hz, that lines before the table state, and a remark; None if two differ."""
     found = [(match, line) for line in lines[:_SAMPLED_LINES] if (match := _RATE.search(line))]
     rates = {float(match[1] or match[2]) for match, _ in found}
     if len(rates) != 1 or not min(rates) > 0.0:
@@ -115,7 +115,7 @@ def logical_lines(text: str) -> list[str]:
     if '"' not in text:
         return text.splitlines()
     rows: list[str] = []
-    waiting: list[str] = []  # lines from one that opens a field with a quote and does not close it
+    waiting: list[str] = []  # lines of a field whose opening quote is not closed yet
     for line in text.splitlines():
         if not waiting and '"' not in line:
             rows.append(line)
@@ -194,9 +194,9 @@ def _remarks(detected: Layout, lines: Sequence[str], encoding: str) -> tuple[str
     begin = detected.first if detected.header < 0 else detected.header
     passed = [line for line in lines[:begin] if not is_comment(line)]
     if passed:
-        place = f"the {'header' if detected.header >= 0 else 'first row'} in line {begin + 1}"
+        where = f"the {'header' if detected.header >= 0 else 'first row'} in line {begin + 1}"
         start = shown(passed[0].strip(), 60)
-        remarks.append(f"{len(passed)} lines before {place} were not read, beginning with '{start}'")
+        remarks.append(f"{len(passed)} lines before {where} were not read, beginning with '{start}'")
     if detected.integers:
         numbers = ", ".join(filter(None, detected.names[:6]))
         remarks.append(f"line {detected.header + 1} only numbers the columns: {numbers}, …")
@@ -213,7 +213,7 @@ def without_thousands(lines: Sequence[str]) -> tuple[Sequence[str], str]:
     """Lines with their numbers without separators of thousands, and a remark; the lines as they are where there are none.
 
     16,384 · 16.384,5 · 16'384 · 16 384. A comma or a point may also be the decimal sign, and 16,384 read as 16.384 gives a record
-    that looks sound: a separator is taken only where the text shows that it is one; elsewhere it stays the decimal sign.
+    that looks sound: a sign counts as a separator only where the text shows it; elsewhere it stays the decimal sign.
     """
     later = lines[len(lines) // 3 :]
     sample = [line for line in later[:: max(1, len(later) // _SAMPLED_LINES)] if not is_comment(line)]
@@ -248,26 +248,26 @@ def _grouped(sign: str) -> re.Pattern[str]:
 def _is_separator(sign: str, rows: Sequence[Sequence[str]]) -> bool:
     """Whether a sign groups digits in all words that have it between digits."""
     words = [word for row in rows for word in row]
-    own = [word for word in words if re.search(rf"\d{re.escape(sign)}\d", word)]
+    signed = [word for word in words if re.search(rf"\d{re.escape(sign)}\d", word)]
     grouped = _grouped(sign)
-    if not own or not all(grouped.fullmatch(word) for word in own):
+    if not signed or not all(grouped.fullmatch(word) for word in signed):
         return False
     if sign not in {",", "."}:
         return True
     other = "." if sign == "," else ","
-    if any(other in word or word.count(sign) > 1 for word in own):
+    if any(other in word or word.count(sign) > 1 for word in signed):
         return True
     if any(other in word and is_number(word, other) for word in words):
-        return True  # the decimal sign of this text is the other one
-    return len(own) >= _MANY and any(
+        return True  # the decimal sign of this text is the other sign
+    return len(signed) >= _MANY and any(
         _mixed([row[k] for row in rows if k < len(row)], grouped) for k in range(max(map(len, rows)))
     )
 
 
 def _mixed(column: Sequence[str], grouped: re.Pattern[str]) -> bool:
     """Whether a column has grouped numbers, and whole numbers, which are all below a thousand."""
-    whole = [abs(int(word)) for word in column if re.fullmatch(r"[+-]?\d{1,12}", word)]
-    return any(whole) and max(whole) < 1000 and any(grouped.fullmatch(word) for word in column)
+    ungrouped = [abs(int(word)) for word in column if re.fullmatch(r"[+-]?\d{1,12}", word)]
+    return any(ungrouped) and max(ungrouped) < 1000 and any(grouped.fullmatch(word) for word in column)
 
 
 def _cleaned(line: str, divider: str, sign: str, grouped: re.Pattern[str]) -> str:

@@ -86,8 +86,8 @@ def import_transfer(
         "error_percent": diagnosis.error_percent,
         "extended_percent": diagnosis.extended_percent,
         "left_out": list(diagnosis.left_out),
-        "where": [TransferFailure(**asdict(one)) for one in diagnosis.where],
-        "classes": [{"effects": list(one.effects), "p_value": one.p_value} for one in diagnosis.classes],
+        "where": [TransferFailure(**asdict(failure)) for failure in diagnosis.where],
+        "classes": [{"effects": list(missed.effects), "p_value": missed.p_value} for missed in diagnosis.classes],
         "recommended": list(diagnosis.recommended),
         "unexplained": diagnosis.unexplained,
         "alone_hz": list(diagnosis.alone_hz),
@@ -95,7 +95,7 @@ def import_transfer(
         "bandwidth_hz": bandwidth,
         "parameters": parameters,
         "next_hz": list(diagnosis.next_hz),
-        "text": [f"{subject}: {one}" for subject, one in text],
+        "text": [f"{subject}: {sentence}" for subject, sentence in text],
     }
 
 
@@ -117,5 +117,5 @@ def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[
             "record_s": c.record_s, "pressure_hPa": c.pressure,
         }
     )  # fmt: skip
-    tables = procedure_tables([(0, "sweep", rows, Outcome({}, [Finding(unit, *one) for one in text]))])
+    tables = procedure_tables([(0, "sweep", rows, Outcome({}, [Finding(unit, *finding) for finding in text]))])
     return {name: tables[name] for name in ("procedure_points", "procedure_findings")}

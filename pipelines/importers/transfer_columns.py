@@ -50,7 +50,7 @@ _WORDS = {"frequency": ("freq",), "magnitude": ("mag", "gain", "sens"), "phase":
 
 @dataclass(frozen=True)
 class PointsLayout:
-    """What a user states: columns and units by meaning, and the uncertainty of every point, % and degrees."""
+    """The statements of a user: columns and units by meaning, and the uncertainty of every point, % and degrees."""
 
     columns: Mapping[str, str] = field(default_factory=dict[str, str])
     units: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -79,10 +79,10 @@ def stated_layout(columns: str, units: str, part: Path | None) -> PointsLayout:
         if key not in STATED:
             raise WrongUse(f"{part}: key {shown(key)} is not for points that are measured; known: {', '.join(STATED)}")
     try:
-        own = SweepPart.model_validate({"kind": "sweep"} | content)
+        sweep = SweepPart.model_validate({"kind": "sweep"} | content)
     except ValidationError as problem:
         raise explain(problem, str(part), SweepPart) from None
-    return PointsLayout(*layout, {STATED[key]: float(getattr(own, key)) for key in content})
+    return PointsLayout(*layout, {STATED[key]: float(getattr(sweep, key)) for key in content})
 
 
 def transfer_points(content: Content, name: str, layout: PointsLayout) -> tuple[Points, str]:
@@ -95,27 +95,29 @@ def transfer_points(content: Content, name: str, layout: PointsLayout) -> tuple[
     """
     table = content.table
     found = _columns(table, layout)
-    missing = [one for one in NEEDED if one not in found]
+    missing = [meaning for meaning in NEEDED if meaning not in found]
     if missing:
-        there = ", ".join(shown(str(one)) for one in table.columns) or "none"
+        there = ", ".join(shown(str(column)) for column in table.columns) or "none"
         raise DataRejected(
             f"{name}: no column is recognised as {', '.join(missing)} of a transfer function, found {there}; name them with "
-            f"--map {','.join(f'{one}=…' for one in missing)}"
+            f"--map {','.join(f'{meaning}=…' for meaning in missing)}"
         )
     units = {meaning: _unit(content, layout, meaning, column, name) for meaning, column in found.items()}
-    absent = [one for one in UNCERTAINTIES if one not in found and not layout.every_point.get(one)]
+    absent = [meaning for meaning in UNCERTAINTIES if meaning not in found and not layout.every_point.get(meaning)]
     if absent:
         raise DataRejected(
-            f"{name}: the points have no {' and no '.join(one.replace('_', ' ') for one in absent)}, by which a model "
-            f"is judged; name their columns with --map {','.join(f'{one}=…' for one in absent)}, or state that of every "
+            f"{name}: the points have no {' and no '.join(meaning.replace('_', ' ') for meaning in absent)}, by which a model "
+            f"is judged; name their columns with --map {','.join(f'{meaning}=…' for meaning in absent)}, or state that of every "
             "point in a file of --set: repeatability_percent = … and repeatability_deg = …"
         )
     value = {meaning: _values(table, column, name, meaning, units[meaning]) for meaning, column in found.items()}
-    value |= {one: np.full(len(table), size) for one, size in layout.every_point.items() if one not in found}
-    other = {one: np.full(len(table), usual) for one, usual in OPTIONAL.items()}
-    for one in OPTIONAL:
-        if one in table.columns:
-            other[one] = finite_column(table, one, name, "correct the row")
+    value |= {
+        meaning: np.full(len(table), size) for meaning, size in layout.every_point.items() if meaning not in found
+    }
+    other = {meaning: np.full(len(table), usual) for meaning, usual in OPTIONAL.items()}
+    for meaning in OPTIONAL:
+        if meaning in table.columns:
+            other[meaning] = finite_column(table, meaning, name, "correct the row")
     if "pressure_hPa" in table.columns:
         _refuse_not_positive(other["pressure_hPa"], "pressure_hPa", name)
     if len(table) < FEWEST:
@@ -140,7 +142,7 @@ def _own_name(meaning: str) -> str:
 
 
 def _columns(table: pd.DataFrame, layout: PointsLayout) -> dict[str, str]:
-    """The column of each meaning: as it is mapped, else the only one that its name shows to be it."""
+    """The column of each meaning: as it is mapped, else the only column whose name shows the meaning."""
     found = {meaning: [str(name) for name in table.columns if _meaning(str(name)) == meaning] for meaning in UNITS}
     only = {meaning: names[0] for meaning, names in found.items() if len(names) == 1}
     numbered = {meaning: _named(table, column) for meaning, column in layout.columns.items()}
@@ -187,7 +189,7 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
 
 
 def _plain(unit: str) -> str:
-    """A unit as :data:`UNITS` has it; another one as it is."""
+    """A unit as :data:`UNITS` spells it; an unknown unit unchanged."""
     return ALIKE.get(unit.strip().lower(), unit.strip())
 
 

@@ -48,7 +48,7 @@ _CLEAR_COUNTS, _CLEAR_RATIO = 250.0, 30.0
 """Size of whole numbers at rest, and over their scatter: the bias of a gyroscope is smaller."""
 _MOST = 60
 _JUMP = 0.2
-_CELL, _FEWEST_PLACES = 0.1, 5
+_CELL, _FEWEST_CELLS = 0.1, 5
 """Size of a place over the range of the parts; places that a sphere needs: it has four numbers."""
 
 
@@ -79,7 +79,7 @@ class Sphere:
     @property
     def gravity(self) -> str:
         """The unit in which the radius, or the size of one pose, is that of gravity; empty for counts and volts."""
-        close = (u for u, one in unit_check.GRAVITY.items() if abs(self.radius / one - 1.0) < _CLOSE)
+        close = (u for u, gravity in unit_check.GRAVITY.items() if abs(self.radius / gravity - 1.0) < _CLOSE)
         return next(close, "")
 
 
@@ -142,7 +142,7 @@ def _unnamed(columns: Mapping[str, Array], free: Sequence[str], units: Mapping[s
         sphere = sphere_of(columns, names)
         if sphere is not None and sphere.fits and sphere.spans[0] > _MOVES:
             seen.append((names, sphere))
-    sized = [one for one in seen if one[1].gravity]
+    sized = [pair for pair in seen if pair[1].gravity]
     return _one_of(sized or seen, "three columns that move on a sphere at rest, as gravity does")
 
 
@@ -192,8 +192,8 @@ def _fitted(parts: Array, output: Array) -> Sphere:
     pose = Sphere(max(size, 1e-300), np.zeros(3), np.inf, np.sort(spans) / max(size, 1e-300), jumps / max(size, 1e-300))
     if not np.max(spans) > 0.0:
         return pose
-    parts = _places(parts, _CELL * float(np.max(spans)))
-    if len(parts) < _FEWEST_PLACES:
+    parts = _cell_means(parts, _CELL * float(np.max(spans)))
+    if len(parts) < _FEWEST_CELLS:
         return pose
     unit, middle, used = float(np.max(spans)), parts.mean(axis=0), parts
     centre, radius, away = middle, size, np.zeros(len(parts))
@@ -204,16 +204,16 @@ def _fitted(parts: Array, output: Array) -> Sphere:
         radius = unit * float(np.sqrt(max(solved[3] + np.sum(solved[:3] ** 2), 1e-12)))
         away = np.abs(np.linalg.norm(parts - centre, axis=1) - radius)
         used = parts[away <= np.quantile(away, 1.0 - _LEFT_OUT)]
-    kept = np.sort(away)[: max(4, int(np.ceil((1.0 - _LEFT_OUT) * len(away))))]
-    misfit = float(np.sqrt(np.mean(kept**2))) / radius
+    nearest = np.sort(away)[: max(4, int(np.ceil((1.0 - _LEFT_OUT) * len(away))))]
+    misfit = float(np.sqrt(np.mean(nearest**2))) / radius
     found = Sphere(radius, centre, misfit, np.sort(np.ptp(used, axis=0)) / radius, jumps / radius)
     if found.fits and (found.spans[0] > 1.0 or not one_pose):
         return found
     return replace(pose, misfit=misfit)
 
 
-def _places(parts: Array, size: float) -> Array:
-    """One mean for each place (k, 3) where parts lie, so that long rests at one of them do not decide."""
+def _cell_means(parts: Array, size: float) -> Array:
+    """Mean (k, 3) of the parts in each cell of the grid that has some, so that long rests in a cell do not decide."""
     cells = np.unique(np.rint((parts - parts.min(axis=0)) / size), axis=0, return_inverse=True)[1].ravel()
     count = np.bincount(cells)
     return np.stack([np.bincount(cells, weights=parts[:, k]) / count for k in range(3)], axis=1)
@@ -236,9 +236,9 @@ def _shows_gravity(sphere: Sphere, columns: Mapping[str, Array], names: Sequence
     if not sphere.still:
         return len(columns[names[0]]) < 7 and bool(unit_check.looks_like(sphere.radius))
     output = np.column_stack([columns[name] for name in names])
-    whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
+    integers = bool(np.all(output[:1000] == np.rint(output[:1000])))
     clear = sphere.radius > max(_CLEAR_COUNTS, _CLEAR_RATIO * float(np.linalg.norm(np.nanstd(output, axis=0))))
-    return bool(sphere.gravity) or (whole and clear)
+    return bool(sphere.gravity) or (integers and clear)
 
 
 def _lettered(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -251,11 +251,11 @@ def _lettered(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
         stem = name.removesuffix("[0]")
         if stem != name and known.issuperset({f"{stem}[1]", f"{stem}[2]"}) and f"{stem}[3]" not in known:
             yield f"{stem}[?]", (name, f"{stem}[1]", f"{stem}[2]")
-        for place in (k for k, letter in enumerate(name) if letter in "xX"):
-            letters = "xyz" if name[place] == "x" else "XYZ"
-            three = tuple(name[:place] + letter + name[place + 1 :] for letter in letters)
+        for index in (k for k, letter in enumerate(name) if letter in "xX"):
+            letters = "xyz" if name[index] == "x" else "XYZ"
+            three = tuple(name[:index] + letter + name[index + 1 :] for letter in letters)
             if known.issuperset(three):
-                yield name[:place] + "?" + name[place + 1 :], three
+                yield name[:index] + "?" + name[index + 1 :], three
                 break
 
 
@@ -266,8 +266,8 @@ def may_be_output(name: str, unit: str) -> bool:
         return False
     if REFERENCE.match(name):
         return False
-    own = _OF_MATRIX.sub("", name)  # the name of a matrix is that of all its columns
-    return not ((OTHER.search(name) and not stated) or HEAT.search(own) or (COUNT.search(own) and not stated))
+    plain = _OF_MATRIX.sub("", name)  # the name of a matrix is that of all its columns
+    return not ((OTHER.search(name) and not stated) or HEAT.search(plain) or (COUNT.search(plain) and not stated))
 
 
 def _changes(numbers: Array) -> bool:
@@ -288,5 +288,5 @@ def is_row_number(numbers: Array) -> bool:
 
 
 def are_positions(sphere: Sphere | None, rows: int) -> bool:
-    """Whether neighbouring rows are so far apart that each is a position of its own, not a sample of a record."""
+    """Whether neighbouring rows are so far apart that each is a separate position, not a sample of a record."""
     return sphere is not None and rows <= _FEW_ROWS and sphere.fits and sphere.jumps > _JUMP

@@ -35,7 +35,7 @@ def size_of(output: Array) -> float:
 
 def looks_like(size: float) -> str:
     """The unit without a sensitivity in which gravity has this size, within a factor of two; empty if there is none."""
-    return next((unit for unit, one in GRAVITY.items() if LIKELY[0] < size / one < LIKELY[1]), "")
+    return next((unit for unit, gravity in GRAVITY.items() if LIKELY[0] < size / gravity < LIKELY[1]), "")
 
 
 def unit_of(output: Array, size: float, *, means: bool = False) -> tuple[str, str]:
@@ -43,15 +43,15 @@ def unit_of(output: Array, size: float, *, means: bool = False) -> tuple[str, st
 
     ``means``: whether the numbers are means of samples, which are not whole where the samples are counts.
     """
-    whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
+    integers = bool(np.all(output[:1000] == np.rint(output[:1000])))
     likely, power = looks_like(size), np.log2(max(size, 1e-300))
     of_two = size > _FEWEST_COUNTS and bool(abs(power - np.rint(power)) < _NEAR_POWER)
-    if likely and not (whole and likely != "mg"):
-        doubt = f", though whole numbers may be counts{DOUBT}" if whole else ""
+    if likely and not (integers and likely != "mg"):
+        doubt = f", though whole numbers may be counts{DOUBT}" if integers else ""
         if means and of_two and abs(size - 2.0 ** np.rint(power)) < abs(size - GRAVITY[likely]):
             doubt = f", though means of counts are closer to {2.0 ** np.rint(power):g}{DOUBT}"
         return likely, f"its norm is {size:.5g}, gravity in {likely} is {GRAVITY[likely]:.5g}{doubt}"
-    if whole:
+    if integers:
         return "LSB", f"whole numbers with a norm of {size:.5g}"
     if of_two:
         return "LSB", f"its norm is {size:.5g}, close to a power of two: means of counts"
@@ -72,12 +72,12 @@ def unsigned_bits(output: Array) -> int:
     bits = next((b for b in _BITS if x.max() < 2.0**b), 0)
     if not bits or not np.any(x >= 2.0 ** (bits - 1)):
         return 0
-    whole = 2.0**bits
-    ends = np.mean(x < _END * whole), np.mean(x >= (1.0 - _END) * whole)
-    if min(ends) < _OFTEN or np.mean(np.abs(x - 0.5 * whole) < _END * whole) > _SELDOM:
+    span = 2.0**bits
+    ends = np.mean(x < _END * span), np.mean(x >= (1.0 - _END) * span)
+    if min(ends) < _OFTEN or np.mean(np.abs(x - 0.5 * span) < _END * span) > _SELDOM:
         return 0
-    signed = np.where(x >= 0.5 * whole, x - whole, x)
-    parted = _jumps(x, 0.5 * whole) > _OFTEN > 10.0 * _jumps(signed, 0.5 * whole)
+    signed = np.where(x >= 0.5 * span, x - span, x)
+    parted = _jumps(x, 0.5 * span) > _OFTEN > 10.0 * _jumps(signed, 0.5 * span)
     return bits if parted or _scatter(signed) < _STEADY else 0
 
 
@@ -113,7 +113,7 @@ def refuse_other_unit(output: Array, claimed: str, where: str, *, means: bool = 
             f"{where}: the norm of the output is {size:.5g}, about {GRAVITY[claimed]:.5g} is needed if its unit is {claimed}; "
             f"{advice}"
         )
-    close = next((unit for unit, one in GRAVITY.items() if abs(size / one - 1.0) < SURE), "")
+    close = next((unit for unit, gravity in GRAVITY.items() if abs(size / gravity - 1.0) < SURE), "")
     if claimed == "LSB":
         return _counts(output, size, close, where, may_be_parts=means and size > _FEWEST_COUNTS)
     volts = size * (1e-3 if claimed == "mV" else 1.0)
@@ -130,7 +130,7 @@ def refuse_other_unit(output: Array, claimed: str, where: str, *, means: bool = 
 
 def _counts(output: Array, size: float, close: str, where: str, *, may_be_parts: bool) -> tuple[str, ...]:
     """As :func:`refuse_other_unit`, of counts; ``may_be_parts``: whether they need not be whole numbers."""
-    whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
+    integers = bool(np.all(output[:1000] == np.rint(output[:1000])))
     bits = unsigned_bits(output)
     if bits:
         half = 2 ** (bits - 1)
@@ -138,7 +138,7 @@ def _counts(output: Array, size: float, close: str, where: str, *, may_be_parts:
             f"{where}: signed words of {bits} bits were read without their sign: with {2 * half} subtracted from the values of "
             f"{half} and above the norm is steady, as gravity is, and without it is not; subtract {2 * half} from these values"
         )
-    if close and not whole and not may_be_parts:
+    if close and not integers and not may_be_parts:
         raise DataRejected(
             f"{where}: the norm of the output is {size:.5g} and its values are not whole numbers, counts are needed if its "
             f"unit is LSB; the unit looks like {close}, give --unit-of output={close}"
@@ -146,4 +146,4 @@ def _counts(output: Array, size: float, close: str, where: str, *, may_be_parts:
     if close:
         return (f"CHECK THE UNIT: the norm of the output is {size:.5g}, as gravity in {close}; LSB was given",)
     doubt = "CHECK THE UNIT: values within a few units of one another that are not whole numbers, but LSB was given"
-    return (doubt,) if not whole and np.ptp(output[:1000]) < 8.0 else ()
+    return (doubt,) if not integers and np.ptp(output[:1000]) < 8.0 else ()

@@ -39,7 +39,7 @@ _UNITS = {"s": "s", "C": "°C", "g": "g", "deg": "°", "hz": "Hz", "V": "V"}
 
 
 def is_moment(values: pd.Series) -> bool:
-    """Whether a column holds points in time, or spans of it, in a type of its own."""
+    """Whether a column holds points in time, or spans of it, in a type for times."""
     return values.dtype.kind in "mM" or isinstance(values.dtype, pd.DatetimeTZDtype)
 
 
@@ -122,7 +122,7 @@ def refuse_outside(values: Array, column: str, where: str, *, label: str = "", f
     Parameters
     ----------
     column : whose bounds hold; those of any number for one without a meaning.
-    label : its name in the message; the same by default.
+    label : its name in the message; the column's name by default.
     """
     low, high = BOUNDS.get(column, (-LARGEST, LARGEST))
     bad = np.flatnonzero((values < low) | (values > high))

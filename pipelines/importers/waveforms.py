@@ -62,7 +62,7 @@ def import_waveforms(
     layout: RecordingLayout,
     archive: str | None = None,
 ) -> WaveformImport:
-    """Figures and findings of a procedure from the recordings of one unit, one file a record; kept as a run of the archive.
+    """Figures and findings of a procedure from the recordings of one unit, one file a record; stored as a run of the archive.
 
     Parameters
     ----------
@@ -80,38 +80,38 @@ def import_waveforms(
             raise WrongUse(
                 f"import: --map {shown(meaning)}=…: no channel of a recording; {did_you_mean(meaning, CHANNELS)}"
             )
-    one, own, content, full_scale = _part(procedure, part)
+    test, stated, content, full_scale = _part(procedure, part)
     records: list[ProcedureRecord] = []
-    recordings = [_recording(path, layout, own, one) for path in paths]
+    recordings = [_recording(path, layout, stated, test) for path in paths]
     sources, out_unit = [made.source for made in recordings], recordings[0].unit
-    own = _scaled(own, one, out_unit, part)
-    driven = [made.own if made.reference is None else made.reference for made in recordings]
+    stated = _scaled(stated, test, out_unit, part)
+    driven = [made.samples if made.reference is None else made.reference for made in recordings]
     try:
-        own = one.completed(own, driven)
+        stated = test.completed(stated, driven)
     except InertialError as problem:
         raise DataRejected(f"{paths[0].name}: {problem}") from None
     for number, (path, made, drive) in enumerate(zip(paths, recordings, driven, strict=True)):
         if made.unit != out_unit:
             raise DataRejected(f"{path.name}: output in {made.unit}, {out_unit} in the files before; import them apart")
         pose = Pose(name="imported", outer_deg=0.0, inner_deg=0.0)
-        setting = one.setting_of(own, drive)
-        step = ProcedureStep(path.name, pose, own.temperature_C, role="imported", setting=setting)
+        setting = test.setting_of(stated, drive)
+        step = ProcedureStep(path.name, pose, stated.temperature_C, role="imported", setting=setting)
         reading = {
             "unit": unit,
-            "unit_C": own.temperature_C,
+            "unit_C": stated.temperature_C,
             "supply_V": np.nan,
             "full_scale": full_scale,
             "out_unit": out_unit,
         }
-        samples = {unit: made.own} | ({} if made.reference is None else {REFERENCE: made.reference})
+        samples = {unit: made.samples} | ({} if made.reference is None else {REFERENCE: made.reference})
         records.append(ProcedureRecord(number, step, pd.DataFrame([reading]), samples))
     device = Device({}, {}, full_scale, out_unit)
     try:
-        points = one.reduce(own, records, device)
+        points = test.reduce(stated, records, device)
         mapped = [axis for axis in AXES if axis in layout.columns]
         points = points[points["axis"].isin(mapped)].reset_index(drop=True)
-        outcome = one.evaluate(own, points, device)
-        verdict = one.verdict(own, points)
+        outcome = test.evaluate(stated, points, device)
+        verdict = test.verdict(stated, points)
     except InertialError as problem:
         raise DataRejected(f"{paths[0].name}: {problem}") from None
     values = outcome.figures.get(unit, [])
@@ -122,9 +122,9 @@ def import_waveforms(
         texts.append(
             ("not judged", "clipping at the end of the range: full_scale is not given; add it to the file of --set")
         )
-    content |= own.model_dump(include={"duration_ms", "before_ms"} - set(content))
+    content |= stated.model_dump(include={"duration_ms", "before_ms"} - set(content))
     about = {
-        "name": f"{one.title} of {unit}, recorded elsewhere",
+        "name": f"{test.title} of {unit}, recorded elsewhere",
         "source": sources[0].as_dict(),
         "sources": [source.as_dict() for source in sources],
         "lot": lot_of_import([unit]),
@@ -136,7 +136,7 @@ def import_waveforms(
     outcome = Outcome({unit: values}, [Finding(unit, *text) for text in texts])
     tables = procedure_tables([(0, procedure, points, outcome)])
     run = keep_tables("import of waveforms", digest_of(sources), parameters, about, tables, archive)
-    units = {spec.name: spec.unit for spec in one.figures}
+    units = {spec.name: spec.unit for spec in test.figures}
     figures: list[WaveformFigure] = [
         {
             "figure": f.figure, "axis": f.axis, "value": f.value if f.identified and np.isfinite(f.value) else None,
@@ -159,16 +159,16 @@ def import_waveforms(
 def _without_value(values: Sequence[FigureValue]) -> list[tuple[str, str]]:
     """The figures without a value, those of one reason together: what the files cannot hold, and what they do not determine."""
     of_reason: dict[tuple[str, str], list[str]] = {}
-    for one in values:
-        if not (one.identified and np.isfinite(one.value)):
-            subject = "not determined" if one.measured else "not measured"
-            of_reason.setdefault((subject, one.note), []).append(one.figure)
+    for figure in values:
+        if not (figure.identified and np.isfinite(figure.value)):
+            subject = "not determined" if figure.measured else "not measured"
+            of_reason.setdefault((subject, figure.note), []).append(figure.figure)
     return [(subject, f"{', '.join(names)}: {note}") for (subject, note), names in of_reason.items()]
 
 
 def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[str, Any], float]:
     """The procedure, its part, the content of its file, and the full scale of the output (infinite where it is not given)."""
-    can = {name: one for name, one in PROCEDURES.items() if isinstance(one, FromWaveforms)}
+    can = {name: test for name, test in PROCEDURES.items() if isinstance(test, FromWaveforms)}
     if procedure not in can:
         what = f"--procedure: found '{shown(procedure)}', {', '.join(can)} can be imported"
         raise WrongUse(f"{what}; {did_you_mean(procedure, can)}")
@@ -181,14 +181,14 @@ def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[s
         )
     part = can[procedure].part
     try:
-        own = part.model_validate(content)
+        stated = part.model_validate(content)
     except ValidationError as problem:
         raise explain(problem, str(path or "--set FILE.toml"), part) from None
-    return can[procedure], own, content, float(full_scale)
+    return can[procedure], stated, content, float(full_scale)
 
 
 def _scaled(part: Any, procedure: FromWaveforms, out_unit: str, path: Path | None) -> Any:
-    """The part with a scale: one is stated, or follows from an output that is an acceleration.
+    """The part with a scale: the scale is stated, or follows from an output that is an acceleration.
 
     A recording made elsewhere has no multi-position test that determines it.
     """
@@ -203,9 +203,9 @@ def _scaled(part: Any, procedure: FromWaveforms, out_unit: str, path: Path | Non
 
 
 class _Recording(NamedTuple):
-    """One file: the unit, the reference (None without one), the unit of the output, and the source."""
+    """One file: the unit, the reference (None without it), the unit of the output, and the source."""
 
-    own: UnitRecord
+    samples: UnitRecord
     reference: UnitRecord | None
     unit: str
     source: files.SourceFile
@@ -227,11 +227,11 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
         )
     text = _unit(content, layout, "output", next(iter(outputs.values())), path.name)
     known = VOLT if procedure.reference_unit == "V" else ACCELERATION
-    own = UnitRecord(time := _clock(content, layout, path.name), np.zeros((len(time), 3)))
+    samples = UnitRecord(time := _clock(content, layout, path.name), np.zeros((len(time), 3)))
     for axis, column in outputs.items():
-        own.output[:, AXES.index(axis)] = finite_column(content.table, column, path.name)
+        samples.output[:, AXES.index(axis)] = finite_column(content.table, column, path.name)
     if not driven:
-        return _Recording(own, None, text, source, content.remarks)
+        return _Recording(samples, None, text, source, content.remarks)
     reference_unit = _unit(other, layout, "reference", layout.columns["reference"], path.name)
     if reference_unit not in known:
         raise DataRejected(
@@ -240,17 +240,17 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
         )
     drive_time = _clock(other, layout, path.name)
     drive = np.zeros((len(drive_time), 3))
-    place = AXES.index(part.axis) if hasattr(part, "axis") else 0
-    drive[:, place] = known[reference_unit] * finite_column(other.table, layout.columns["reference"], path.name)
+    driven_axis = AXES.index(part.axis) if hasattr(part, "axis") else 0
+    drive[:, driven_axis] = known[reference_unit] * finite_column(other.table, layout.columns["reference"], path.name)
     for k, axis in enumerate(AXES):
         if f"reference_{axis}" in layout.columns:
             column = layout.columns[f"reference_{axis}"]
             drive[:, k] = known[reference_unit] * finite_column(other.table, column, path.name)
-    return _Recording(own, UnitRecord(drive_time, drive), text, source, content.remarks)
+    return _Recording(samples, UnitRecord(drive_time, drive), text, source, content.remarks)
 
 
 def _unit(content: Content, layout: RecordingLayout, meaning: str, column: str, where: str) -> str:
-    """Unit of a channel: as stated by the command, else by the file; one that neither states is refused."""
+    """Unit of a channel: as stated by the command, else by the file; a unit that neither states is refused."""
     stated = content.units.get(column, "") or unit_in(column)
     given = layout.units.get(meaning, "")
     if not (given or stated):

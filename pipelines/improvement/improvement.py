@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ImprovedTables:
-    """Dwells and temperatures of the run, and of the fresh run where there is one."""
+    """Dwells and temperatures of the run, and of the fresh run where it was measured."""
 
     dwells: pd.DataFrame
     history: pd.DataFrame | None
@@ -33,7 +33,7 @@ class ImprovedTables:
 
 
 class Attendant:
-    """Who sees an improvement and answers its questions: nobody here, a terminal or pages in a class of their own."""
+    """Who sees an improvement and answers its questions: nobody here, a terminal or pages in a subclass."""
 
     def working(self, what: str) -> AbstractContextManager[Any]:
         """Shows what is computed, until it is done."""
@@ -50,12 +50,12 @@ class Attendant:
         return not others
 
     def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
-        """Name, dwells and temperatures of a fresh run that is there or is measured now; None without one."""
+        """Name, dwells and temperatures of a fresh run that is there or is measured now; None without a fresh run."""
         return None
 
 
 def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str, ModelFile | None]:
-    """The text of a model file with one version more per step, and its model; None without a step."""
+    """The text of a model file with one version more per step, and its model; None where no step is given."""
     from pipelines.jobs.model_files import extended
 
     model = None
@@ -130,7 +130,7 @@ class Improvement:
         }
 
     def _with_fresh(self, *, changed: bool) -> tuple[ImprovedTables, str]:
-        """The tables with those of a fresh run, and its name; a changed model is judged by one where there may be one."""
+        """The tables with those of a fresh run, and its name; a fresh run judges a changed model where it can be measured."""
         if self.fresh or not changed:
             return self.tables, self.fresh
         found = self.attendant.fresh_run()
@@ -169,21 +169,21 @@ class Improvement:
                 )
         answers: list[ImprovementChoice] = []
         for members in classes:
-            own = [name for name in named if name in members]
-            if len(own) > 1:
+            chosen = [name for name in named if name in members]
+            if len(chosen) > 1:
                 raise WrongUse(
-                    f"improve: --effect {','.join(own)}: these data cannot separate them, one per class is needed; name one"
+                    f"improve: --effect {','.join(chosen)}: these data cannot separate them, one per class is needed; name one"
                 )
-            effect = next(name for name in (*own, *diagnosis["recommended"]) if name in members)
+            effect = next(name for name in (*chosen, *diagnosis["recommended"]) if name in members)
             others = [name for name in members if name != effect]
-            decided, added = self._answer(effect, others, chosen=bool(own), named=bool(named), yes=yes)
+            decided, added = self._answer(effect, others, chosen=bool(chosen), named=bool(named), yes=yes)
             answers.append({"effect": effect, "not_separated_from": others, "decided_by": decided, "added": added})
         return answers
 
     def _answer(
         self, effect: str, others: list[str], *, chosen: bool, named: bool, yes: bool
     ) -> tuple[Literal["question", "--effect", "--yes", "undecided"], bool]:
-        """What decided on an effect, and whether it is added."""
+        """How it was decided on an effect (an option, a question, or not at all), and whether it is added."""
         if named:
             return "--effect", chosen
         if yes:

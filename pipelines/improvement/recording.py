@@ -1,4 +1,4 @@
-"""A recording of another system as a run of the archive: recognised, imported and fitted, with the command that says the same."""
+"""A recording of another system as a run of the archive: recognised, imported and fitted, with the equivalent command."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def bring_in(
         "files": [str(path) for path in paths],
         "form": seen.source.form,
         "rows": len(seen.content.table),
-        "columns": {meaning: one for meaning in proposal.keys["columns"] if (one := guessed.column(meaning))},
+        "columns": {meaning: column for meaning in proposal.keys["columns"] if (column := guessed.column(meaning))},
         "reason": guessed.triad.reason,
         "output_unit": guessed.output.meaning,
         "output_reason": guessed.output.reason,

@@ -17,7 +17,7 @@ class InquiryMinutes(TypedDict):
 
 
 class InquiryRound(TypedDict):
-    """One follow-up that was measured."""
+    """A follow-up measurement and its diagnosis."""
 
     run: str
     why: Annotated[list[str], "effects that it separates"]

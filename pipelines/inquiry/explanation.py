@@ -98,4 +98,6 @@ def _power(state: State, ids: Sequence[str]) -> str:
     again = [name for name in ids if begins_again(state, name)]
     on = [name for name in ids if name not in again]
     parts = [(again, "restarts", "restart"), (on, "continues", "continue")]
-    return ", ".join(f"{' and '.join(names)} {one if len(names) == 1 else many}" for names, one, many in parts if names)
+    return ", ".join(
+        f"{' and '.join(names)} {single if len(names) == 1 else many}" for names, single, many in parts if names
+    )

@@ -72,7 +72,7 @@ def station_minutes(sequence: Sequence[SequenceStep], base: Job, now: StationPos
 
 
 def follow_up(sequence: Sequence[SequenceStep], base: Job, last: Job, parents: Sequence[str], why: str) -> Job:
-    """The job that measures only these steps, on the same station and lot, from the end of the newest run."""
+    """The job that measures only these steps, on the station and lot of the newest run, from its end on."""
     now = state_after(last)
     poses: dict[tuple[float, float], Pose] = {}
     for step in sequence:

@@ -56,7 +56,7 @@ def ending_of(joint: JointDiagnosis) -> Ending | None:
 
 
 def _all_identified(document: DiagnosisDocument) -> str:
-    """Every class has one effect; those that no dwells left out can judge are told."""
+    """Every class has one effect; effects that no left-out dwell can judge are reported."""
     groups = document["classes"]
     text = f"every class contains one effect: {', '.join(g['effects'][0] for g in groups)}"
     unjudged = [g["effects"][0] for g in groups if g.get("scope") != "data" and g.get("heldout_after_ug", 0.0) is None]

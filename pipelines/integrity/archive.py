@@ -42,7 +42,7 @@ READERS_OF_OBJECTS = 32  # an object store answers slowly, but many requests at 
 class Report:
     """Result of a verification.
 
-    head : hash of the last entry of the chain; a copy of it, kept elsewhere, shows later whether entries were removed.
+    head : hash of the last entry of the chain; a copy of it elsewhere shows later whether entries were removed.
     trust : sentence about the signatures.
     """
 
@@ -98,14 +98,14 @@ def verify(
     runs : only these runs and their captures; the whole archive where empty.
     keys : public keys that are trusted, by name.
     demanded : whether a manifest without a signature by one of these is wrong.
-    head : hash of an entry of the chain from a copy kept elsewhere.
+    head : hash of an entry of the chain from a copy elsewhere.
     also : further checks of the whole archive, of tables that this package does not know.
     """
     open_still = _being_written(archive, runs)
     looked = partial(_verified, archive, runs, keys, demanded=demanded, head=head, also=also, progress=progress)
     report = looked()
     if report.checked.findings and open_still:
-        first, report = {(one.kind, one.path) for one in report.checked.findings}, looked()
+        first, report = {(finding.kind, finding.path) for finding in report.checked.findings}, looked()
         report.checked.findings = [
             finding for finding in report.checked.findings if (finding.kind, finding.path) in first
         ]
@@ -121,7 +121,9 @@ def _being_written(archive: Archive, runs: Sequence[str]) -> bool:
 
 def _chosen(archive: Archive, runs: Sequence[str]) -> list[Run]:
     """The runs of these names; all where none is named."""
-    return [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
+    return [archive.run(name) for name in runs] or [
+        Run(archive, folder.name) for folder in _below(archive.root / "runs")
+    ]
 
 
 def _verified(
@@ -134,7 +136,7 @@ def _verified(
     also: Sequence[Callable[[Archive, VerifiedPart], None]],
     progress: Callable[[int, int], None],
 ) -> Report:
-    """One reading of an archive."""
+    """The report of a single pass over an archive."""
     from schemas import tables
 
     start, total = time.perf_counter(), VerifiedPart(archive.root, keys)
@@ -200,7 +202,7 @@ def _below(folder: Place) -> list[Place]:
     """Folders in a folder, by name."""
     if not folder.is_dir():
         return []
-    return sorted((place for place in folder.iterdir() if place.is_dir()), key=lambda place: place.name)
+    return sorted((path for path in folder.iterdir() if path.is_dir()), key=lambda path: path.name)
 
 
 def _report_untrusted(total: VerifiedPart, *, demanded: bool) -> None:
@@ -233,10 +235,10 @@ def _trust(total: VerifiedPart) -> str:
 
 def check_list(archive: Archive, checked: VerifiedPart) -> None:
     """Lines of the list must agree with the runs, where these were not changed since."""
-    place = archive.root / "index" / "list.json"
-    lines, state = stored_lines(place)
+    path = archive.root / "index" / "list.json"
+    lines, state = stored_lines(path)
     if state == derived.EDITED:
-        checked.wrong(CHANGED, place, f"was edited since it was made: {MADE_AGAIN}")
+        checked.wrong(CHANGED, path, f"was edited since it was made: {MADE_AGAIN}")
     for name, (stamp, line) in lines.items():
         run = Run(archive, name)
         if stamp_of(run) != stamp:
@@ -246,21 +248,21 @@ def check_list(archive: Archive, checked: VerifiedPart) -> None:
         except (ArchiveUnusable, KeyError, TypeError):  # the check of the run reports it
             continue
         if info is None or not agrees(info, line):
-            checked.wrong(CHANGED, place, f"disagrees with the files of run {name}: {MADE_AGAIN}")
+            checked.wrong(CHANGED, path, f"disagrees with the files of run {name}: {MADE_AGAIN}")
 
 
 def check_ledger_index(archive: Archive, checked: VerifiedPart) -> None:
     """Events of the index must agree with the files of the ledger, where these were not changed since."""
     stamps = stamps_of(archive.root / LEDGER)
     for digit in DIGITS:
-        place = archive.root / INDEX_FOLDER / f"{digit}.noted"
-        stored, state = indexed_events(place)
+        path = archive.root / INDEX_FOLDER / f"{digit}.noted"
+        stored, state = indexed_events(path)
         if state == derived.EDITED:
-            checked.wrong(CHANGED, place, f"was edited since it was made: {MADE_AGAIN}")
-        own = stamps.get(digit, {})
-        held = [name for name, one in stored.items() if own.get(name) == one.stamp]
+            checked.wrong(CHANGED, path, f"was edited since it was made: {MADE_AGAIN}")
+        current = stamps.get(digit, {})
+        held = [name for name, event in stored.items() if current.get(name) == event.stamp]
         if any(stored[name].event != event for name, event in all_read(archive.root / LEDGER, held).items()):
-            checked.wrong(CHANGED, place, f"disagrees with the files of the ledger: {MADE_AGAIN}")
+            checked.wrong(CHANGED, path, f"disagrees with the files of the ledger: {MADE_AGAIN}")
 
 
 def check_packs(archive: Archive, checked: VerifiedPart) -> None:
@@ -270,22 +272,22 @@ def check_packs(archive: Archive, checked: VerifiedPart) -> None:
     top = archive.root / PACKS
     if not top.is_dir():
         return
-    for place in sorted(top.glob(f"*{CONTENTS}")):
-        pack = place.with_suffix(CONTAINER)
+    for contents in sorted(top.glob(f"*{CONTENTS}")):
+        pack = contents.with_suffix(CONTAINER)
         if not pack.is_file():
             checked.wrong(MISSING, pack, f"is missing, its table of contents is there: {FROM_A_COPY}")
             continue
         try:
-            state, about = derived.unframed(place)[1], Contents(place).about()
+            state, about = derived.unframed(contents)[1], Contents(contents).about()
             changed = files.sha256(pack) != about.get("sha256")
         except (OSError, ValueError):
-            checked.wrong(UNREADABLE, place, f"is no table of contents of a pack: {FROM_A_COPY}")
+            checked.wrong(UNREADABLE, contents, f"is no table of contents of a pack: {FROM_A_COPY}")
             continue
         if state == derived.EDITED:
-            checked.wrong(CHANGED, place, f"was edited since the pack was made: {FROM_A_COPY}")
+            checked.wrong(CHANGED, contents, f"was edited since the pack was made: {FROM_A_COPY}")
         if changed:
             checked.wrong(CHANGED, pack, f"has changed since it was made: {FROM_A_COPY}")
-    for place in sorted(top.glob(f"*{CONTAINER}")):
-        if not place.with_suffix(CONTENTS).is_file():
+    for pack in sorted(top.glob(f"*{CONTAINER}")):
+        if not pack.with_suffix(CONTENTS).is_file():
             what = "has no table of contents: a compaction was killed; the next one removes it"
-            checked.remarks.append(f"{checked.name(place)} {what}")
+            checked.remarks.append(f"{checked.name(pack)} {what}")

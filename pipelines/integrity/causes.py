@@ -28,7 +28,7 @@ def by_cause(
     by_path: dict[str, list[IntegrityFinding]] = {}
     for finding in dict.fromkeys(findings):
         by_path.setdefault(finding.path, []).append(finding)
-    causes = {path: _one(group) for path, group in by_path.items()}
+    causes = {path: _joined(group) for path, group in by_path.items()}
     for folder, paths in _gone(causes, root).items():
         if len(paths) >= FEWEST_GONE:
             cause = IntegrityFinding(MISSING, folder, f"is missing, {len(paths)} of its files are named elsewhere")
@@ -39,21 +39,21 @@ def by_cause(
             causes[over] = _with(causes[over], [causes.pop(path)])
     _without_disagreements(causes, by_path, differing)
     _by_folder(causes, by_path, differing)
-    return [replace(one, because="") for one in causes.values()]
+    return [replace(finding, because="") for finding in causes.values()]
 
 
 def _without_disagreements(
     causes: dict[str, IntegrityFinding], by_path: Mapping[str, Sequence[IntegrityFinding]], differing: Collection[str]
 ) -> None:
-    """List a file that only disagrees with others, and is as it was sealed, under the other one."""
+    """List a file that is as it was sealed, and only disagrees with another, under that other file."""
     for path in list(causes):
-        links = [one.because for one in by_path.get(path, ())]
+        links = [finding.because for finding in by_path.get(path, ())]
         if path not in causes or path in differing or not links or not all(links):
             continue
         others = [link for link in dict.fromkeys(links) if link in causes and link != path]
-        proved = [one for one in others if one in differing]
-        direct = [one for one in others if any(not finding.because for finding in by_path.get(one, ()))]
-        fuller = [one for one in others if len(by_path.get(one, ())) > len(links)]
+        proved = [link for link in others if link in differing]
+        direct = [link for link in others if any(not finding.because for finding in by_path.get(link, ()))]
+        fuller = [link for link in others if len(by_path.get(link, ())) > len(links)]
         for other in (proved or direct or fuller)[:1]:
             causes[other] = _with(causes[other], [causes.pop(path)])
 
@@ -61,18 +61,18 @@ def _without_disagreements(
 def _by_folder(
     causes: dict[str, IntegrityFinding], by_path: Mapping[str, Sequence[IntegrityFinding]], differing: Collection[str]
 ) -> None:
-    """One finding for the edited manifests of one run or capture: who edits several edits them together."""
+    """Join the findings on edited manifests of a run or capture, since they are mostly edited together."""
     folders: dict[str, list[str]] = {}
-    for path, one in causes.items():
+    for path, cause in causes.items():
         parts = PurePosixPath(path).parts
-        if parts[:1] in {("runs",), ("captures",)} and path.endswith(".json") and one.kind in {EDITED, SIGNATURE}:
+        if parts[:1] in {("runs",), ("captures",)} and path.endswith(".json") and cause.kind in {EDITED, SIGNATURE}:
             folders.setdefault("/".join(parts[:2]), []).append(path)
 
     def rank(path: str) -> tuple[bool, bool, bool, int]:
-        own = by_path.get(path, ())
-        exchanged = any(one.message.startswith(OF_ANOTHER) for one in own)
-        moved = any(one.kind == CHANGED for one in own)  # numbers, not only hashes
-        return not exchanged, not moved, path not in differing, -len(own)
+        findings = by_path.get(path, ())
+        exchanged = any(finding.message.startswith(OF_ANOTHER) for finding in findings)
+        moved = any(finding.kind == CHANGED for finding in findings)  # numbers, not only hashes
+        return not exchanged, not moved, path not in differing, -len(findings)
 
     for paths in folders.values():
         if len(paths) > 1:
@@ -85,14 +85,14 @@ def _by_folder(
             causes[paths[0]] = _with(replace(first, message=first.message + also), others)
 
 
-def _one(findings: list[IntegrityFinding]) -> IntegrityFinding:
-    """The findings of one path as one: an invalid signature first, then the first finding."""
-    first = min(findings, key=lambda one: one.kind != SIGNATURE)
+def _joined(findings: list[IntegrityFinding]) -> IntegrityFinding:
+    """The findings of a path joined: an invalid signature first, then the first finding."""
+    first = min(findings, key=lambda finding: finding.kind != SIGNATURE)
     return _with(first, [finding for finding in findings if finding is not first])
 
 
 def _with(cause: IntegrityFinding, more: Iterable[IntegrityFinding]) -> IntegrityFinding:
-    lines = [line for one in more for line in (f"{one.path}: {one.message}", *one.consequences)]
+    lines = [line for finding in more for line in (f"{finding.path}: {finding.message}", *finding.consequences)]
     return replace(cause, consequences=(*cause.consequences, *lines))
 
 
@@ -118,7 +118,7 @@ TOPS = ("runs", "captures", "calibrations", "chain")
 
 def _manifest_of(path: str) -> str:
     """The manifest of a table."""
-    place = PurePosixPath(path)
-    if place.suffix not in {".parquet", ".html"}:
+    file = PurePosixPath(path)
+    if file.suffix not in {".parquet", ".html"}:
         return ""
-    return str(place.with_name("record.json") if place.parts[0] == "captures" else place.with_suffix(".json"))
+    return str(file.with_name("record.json") if file.parts[0] == "captures" else file.with_suffix(".json"))

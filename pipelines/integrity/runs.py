@@ -20,7 +20,7 @@ Record = tuple[dict[str, Any], str, Place]  # manifest of a record, hash of the 
 
 def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:
     """Check a run."""
-    names = {place.name: place for place in run.path.iterdir()}
+    names = {path.name: path for path in run.path.iterdir()}
     left = any(name.startswith(files.TEMPORARY) for name in names)
     begun = any(name != "lock" and not name.startswith(files.TEMPORARY) for name in names)
     # a re-run publishes all files at once, this one last: a killed re-run left it under a temporary name
@@ -32,11 +32,11 @@ def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:
         return checked
     about, hashes = start[0], {"run": start[1]}
     manifests: dict[str, dict[str, Any]] = {}
-    for name, place in sorted(names.items()):
-        if place.suffix == ".json" and name not in OURS and not name.startswith(files.TEMPORARY):
-            manifest = checked.manifest(place, schema)
+    for name, path in sorted(names.items()):
+        if path.suffix == ".json" and name not in OURS and not name.startswith(files.TEMPORARY):
+            manifest = checked.manifest(path, schema)
             if manifest is not None:
-                manifests[place.stem], hashes[place.stem] = manifest
+                manifests[path.stem], hashes[path.stem] = manifest
     for name, content in manifests.items():
         data = run.path / ("report.html" if name == "report" else f"{name}.parquet")
         checked.table(data, str(content.get("sha256")), content.get("rows"))
@@ -55,7 +55,7 @@ def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:
 
 
 def _check_links(
-    place: Place,
+    path: Place,
     content: dict[str, Any],
     manifests: dict[str, dict[str, Any]],
     hashes: dict[str, str],
@@ -66,19 +66,19 @@ def _check_links(
     if tables and all(name in content for name in KEYED):
         if stage_key(*(content[name] for name in KEYED[:4])) != content["key"]:
             text = "was edited: its key does not agree with its stage, inputs, parameters and code"
-            checked.wrong(EDITED, place, text)
+            checked.wrong(EDITED, path, text)
     elif not isinstance(content.get("parameters", {}), dict):
-        checked.wrong(EDITED, place, "was edited: its parameters are not a table of names and values")
-    for name, expected in checked.named(content, "inputs", place).items():
+        checked.wrong(EDITED, path, "was edited: its parameters are not a table of names and values")
+    for name, expected in checked.named(content, "inputs", path).items():
         if name in manifests and manifests[name].get("sha256") != expected:
-            table = place.parent / f"{name}.json"
-            checked.wrong(EDITED, place, f"names another table {name} than the one in the run", table)
-    for name, expected in checked.named(content, "manifests", place).items():
+            table = path.parent / f"{name}.json"
+            checked.wrong(EDITED, path, f"names another table {name} than the one in the run", table)
+    for name, expected in checked.named(content, "manifests", path).items():
         if name in hashes and hashes[name] != expected:
-            text = f"is not the manifest that {place.stem} was made from: it was edited or written again"
-            checked.wrong(EDITED, place.parent / f"{name}.json", text, place)
+            text = f"is not the manifest that {path.stem} was made from: it was edited or written again"
+            checked.wrong(EDITED, path.parent / f"{name}.json", text, path)
         elif name not in hashes and name != "records":
-            checked.wrong(MISSING, place.parent / f"{name}.json", f"is missing, {place.stem} was made from it")
+            checked.wrong(MISSING, path.parent / f"{name}.json", f"is missing, {path.stem} was made from it")
 
 
 def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, Any]], checked: VerifiedPart) -> None:
@@ -101,23 +101,23 @@ def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, A
 
 def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], checked: VerifiedPart) -> None:
     """Files in the folder of a run that no manifest names."""
-    for name, place in sorted(names.items()):
-        manifest = run.path / f"{place.stem}.json"
+    for name, path in sorted(names.items()):
+        manifest = run.path / f"{path.stem}.json"
         if name.startswith(files.TEMPORARY):
             what = "is a temporary file of a killed or active writer; see 'archive clean'"
-            checked.remarks.append(f"{checked.name(place)} {what}")
-        elif place.suffix == ".parquet" and place.stem not in manifests and not manifest.is_file():
-            mark = table_mark(place)
-            if mark != place.stem:
+            checked.remarks.append(f"{checked.name(path)} {what}")
+        elif path.suffix == ".parquet" and path.stem not in manifests and not manifest.is_file():
+            mark = table_mark(path)
+            if mark != path.stem:
                 what = f"holds table '{mark}'" if mark else "was not written by this archive"
-                checked.wrong(FOREIGN, place, f"{what}: {REMOVE_FOREIGN}")
+                checked.wrong(FOREIGN, path, f"{what}: {REMOVE_FOREIGN}")
             elif "report.json" in names:
                 checked.wrong(MISSING, manifest, "is missing, its table exists")
 
 
-def table_mark(place: Place) -> str:
+def table_mark(path: Place) -> str:
     """Name of the table in the metadata of a Parquet file; empty for a foreign or damaged file."""
-    file = parquet_metadata(place)
+    file = parquet_metadata(path)
     return "" if file is None else (file.metadata or {}).get(parquet.TABLE_MARK, b"").decode(errors="replace")
 
 
@@ -125,7 +125,7 @@ def check_capture(path: Place, checked: VerifiedPart, schema: int) -> VerifiedPa
     """Check a capture."""
     records: list[Record] = []
     unusable: Place | None = None
-    for folder in sorted(path.iterdir(), key=lambda place: place.name):
+    for folder in sorted(path.iterdir(), key=lambda entry: entry.name):
         if not is_number(folder.name):
             continue
         manifest = checked.manifest(folder / "record.json", schema)
@@ -140,7 +140,7 @@ def check_capture(path: Place, checked: VerifiedPart, schema: int) -> VerifiedPa
             checked.wrong(EDITED, folder, f"{found}: two folders were exchanged, or this one was renamed")
         check_strangers(folder, {*content, "record.json"}, checked)
         records.append((*manifest, folder))
-    records.sort(key=lambda one: (str(type(one[0].get("order"))), one[0].get("order", 0)))
+    records.sort(key=lambda record: (str(type(record[0].get("order"))), record[0].get("order", 0)))
     part = checked.blank()
     _check_order(records, part)
     _check_end(path, records, part, schema)
@@ -155,15 +155,15 @@ def check_capture(path: Place, checked: VerifiedPart, schema: int) -> VerifiedPa
 def check_strangers(folder: Place, known: set[str], checked: VerifiedPart) -> None:
     """Tables in a folder that the archive did not write."""
     what = f"was not written by the archive: {REMOVE_FOREIGN}"
-    for place in sorted(folder.iterdir(), key=lambda path: path.name) if folder.is_dir() else ():
-        if place.suffix == ".parquet" and place.name not in known and place.is_file():
-            checked.wrong(FOREIGN, place, what)
+    for file in sorted(folder.iterdir(), key=lambda path: path.name) if folder.is_dir() else ():
+        if file.suffix == ".parquet" and file.name not in known and file.is_file():
+            checked.wrong(FOREIGN, file, what)
 
 
 def _check_order(records: list[Record], checked: VerifiedPart) -> None:
     """Every record names the record before it; the first record in an archive of an older version names none."""
     before = ""
-    for count, (content, own, folder) in enumerate(records):
+    for count, (content, file_hash, folder) in enumerate(records):
         if content.get("order") != count:
             order = content.get("order")
             checked.wrong(MISSING, folder, f"was stored as number {order}, {count} records exist before it")
@@ -171,7 +171,7 @@ def _check_order(records: list[Record], checked: VerifiedPart) -> None:
         if content.get("previous", before) != before:
             earlier = records[count - 1][2] if count else folder
             checked.wrong(EDITED, earlier / "record.json", f"is not the manifest that record {folder.name} refers to")
-        before = own
+        before = file_hash
 
 
 def _check_end(path: Place, records: list[Record], checked: VerifiedPart, schema: int) -> None:
@@ -195,13 +195,13 @@ def _check_events(path: Place, expected: dict[str, str], checked: VerifiedPart) 
     """Compare the journal with its hashes in the last file of the capture."""
     actual = Events(path).hashes()
     for name in sorted({*expected, *actual}):
-        place = path / EVENTS / name
+        file = path / EVENTS / name
         if name not in actual:
-            checked.wrong(MISSING, place, "is missing, the finished capture had this event in its journal")
+            checked.wrong(MISSING, file, "is missing, the finished capture had this event in its journal")
         elif name not in expected:
-            checked.wrong(FOREIGN, place, "was added to the journal after the end of the capture")
+            checked.wrong(FOREIGN, file, "was added to the journal after the end of the capture")
         elif actual[name] != expected[name]:
-            checked.wrong(CHANGED, place, "differs from the event in the journal of the finished capture")
+            checked.wrong(CHANGED, file, "differs from the event in the journal of the finished capture")
 
 
 def _check_state(path: Place, last: Record, checked: VerifiedPart) -> None:
@@ -209,8 +209,8 @@ def _check_state(path: Place, last: Record, checked: VerifiedPart) -> None:
     expected = last[0].get("state")
     if expected is None:  # older versions did not store it
         return
-    place = path / "state" / f"{last[2].name}.bin"
-    if not place.is_file():
-        checked.wrong(MISSING, place, f"is missing, record {last[2].name} refers to this state of the station")
-    elif files.sha256(place) != expected:
-        checked.wrong(CHANGED, place, f"differs from the state of the station in record {last[2].name}")
+    file = path / "state" / f"{last[2].name}.bin"
+    if not file.is_file():
+        checked.wrong(MISSING, file, f"is missing, record {last[2].name} refers to this state of the station")
+    elif files.sha256(file) != expected:
+        checked.wrong(CHANGED, file, f"differs from the state of the station in record {last[2].name}")

@@ -50,25 +50,25 @@ def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = N
     """Read and check the chain; findings go into ``checked``.
 
     only : runs whose sealed files are checked; all where None.
-    head : hash of an entry from a copy kept elsewhere; it must exist.
+    head : hash of an entry from a copy elsewhere; it must exist.
     """
     before, seen, chain, latest = "", set[str](), Chain(), ""
-    for number, place in hash_chain.entries(root):
+    for number, path in hash_chain.entries(root):
         part = checked.blank()
-        manifest = part.manifest(place, 1)
+        manifest = part.manifest(path, 1)
         if only is not None and (manifest is None or manifest[0].get("run") not in only):
             part.untrusted = {}  # signatures of other runs' entries are not checked
         checked.add(part)
         if manifest is None:
             before = ""
             continue
-        content, own = manifest
+        content, file_hash = manifest
         if content.get("number") != number:
-            checked.wrong(EDITED, place, f"says that it is entry {content.get('number')!r}")
+            checked.wrong(EDITED, path, f"says that it is entry {content.get('number')!r}")
         if before and content.get("previous") != before:
             earlier = hash_chain.path_of_entry(root, number - 1)
             checked.wrong(EDITED, earlier, f"is not the entry that number {number} refers to")
-        named = checked.named(content, "files", place)
+        named = checked.named(content, "files", path)
         # names that lead out of the archive are ignored
         inside = {k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")}
         chain.entries[number] = inside
@@ -78,8 +78,8 @@ def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = N
         if when < latest:
             what = f"entry {number} of the chain says {when}, one before it {latest}: a clock was set back"
             checked.remarks.append(what)
-        before, latest = own, max(when, latest)
-        seen.add(own)
+        before, latest = file_hash, max(when, latest)
+        seen.add(file_hash)
     if head and head not in seen:
         what = f"has no entry with hash {head}: entries were removed or written again"
         checked.wrong(MISSING, root / hash_chain.FOLDER, what)
@@ -90,14 +90,14 @@ def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = N
 
 def _is_sealed(root: Place, name: str, expected: str, checked: VerifiedPart) -> bool:
     """Whether a file is there as it was sealed."""
-    place = root / name
+    path = root / name
     try:
-        actual = files.sha256(place)
+        actual = files.sha256(path)
     except OSError:
-        checked.wrong(MISSING, place, "is missing, the chain of the archive names it")
+        checked.wrong(MISSING, path, "is missing, the chain of the archive names it")
         return False
     if actual != expected:
-        checked.wrong(EDITED, place, "differs from what the chain of the archive sealed")
+        checked.wrong(EDITED, path, "differs from what the chain of the archive sealed")
     return actual == expected
 
 
@@ -107,12 +107,12 @@ def check_seals(root: Place, runs: Sequence[Run], chain: Chain, checked: Verifie
         _check_run(run, chain, checked)
     if everything:
         for top, pattern in (("calibrations", "*/*/*.json"), ("programming", "*/*/*.json"), ("releases", "*.json")):
-            for place in sorted((root / top).glob(pattern), key=str) if (root / top).is_dir() else ():
-                if is_number(place.stem) and checked.name(place).replace("\\", "/") not in chain.sealed:
+            for path in sorted((root / top).glob(pattern), key=str) if (root / top).is_dir() else ():
+                if is_number(path.stem) and checked.name(path).replace("\\", "/") not in chain.sealed:
                     with suppress(ArchiveUnusable):  # the check of the ledger reports it
-                        _report(place, files.read_json(place), checked)
-        for place in sorted((root / "whatif").glob("*.json"), key=str) if (root / "whatif").is_dir() else ():
-            _check_evidence(place, checked)
+                        _report(path, files.read_json(path), checked)
+        for path in sorted((root / "whatif").glob("*.json"), key=str) if (root / "whatif").is_dir() else ():
+            _check_evidence(path, checked)
 
 
 def _check_run(run: Run, chain: Chain, checked: VerifiedPart) -> None:
@@ -149,7 +149,7 @@ def _fault_of_seal(run: Run, content: dict[str, Any], chain: Chain, checked: Ver
 def _has_its_stages(run: Run, content: dict[str, Any]) -> bool:
     """Whether the stages in a seal, which lists show, are the stages that made the tables."""
     named = {name.rpartition("/")[2] for name in content["files"] if name.startswith("runs/")}
-    there = {place.name for place in run.path.glob("*.json") if place.name != MARK}
+    there = {path.name for path in run.path.glob("*.json") if path.name != MARK}
     with suppress(ArchiveUnusable):  # the check of the run reports it
         return named != there or "stages" not in content or content["stages"] == stages_of(run.path)
     return True
@@ -157,8 +157,8 @@ def _has_its_stages(run: Run, content: dict[str, Any]) -> bool:
 
 def _check_unsealed(run: Run, chain: Chain, checked: VerifiedPart) -> None:
     """A run without a seal: unfinished, made by a version without a chain, or a finding."""
-    own, report = f"runs/{run.id}/", run.path / REPORT
-    if any(name.startswith(own) for name in chain.sealed):
+    prefix, report = f"runs/{run.id}/", run.path / REPORT
+    if any(name.startswith(prefix) for name in chain.sealed):
         checked.wrong(MISSING, run.path / MARK, "is missing, the chain of the archive has an entry for the run")
     elif report.is_file():
         with suppress(ArchiveUnusable):  # the check of the run reports it
@@ -167,73 +167,73 @@ def _check_unsealed(run: Run, chain: Chain, checked: VerifiedPart) -> None:
                 _report(report, content, checked)
 
 
-def _check_evidence(place: Place, checked: VerifiedPart) -> None:
+def _check_evidence(path: Place, checked: VerifiedPart) -> None:
     """The evidence of a release has the hash of its content in its name; provenance is not part of it."""
     try:
-        content = files.read_json(place)
+        content = files.read_json(path)
     except ArchiveUnusable:
-        checked.wrong(UNREADABLE, place, "is not a readable manifest")
+        checked.wrong(UNREADABLE, path, "is not a readable manifest")
         return
-    kept = {name: value for name, value in content.items() if name not in {*provenance(), ENTRY}}
-    if place.stem != f"{str(kept.get('model'))[:10]}-{digest(kept)[:10]}":
-        checked.wrong(EDITED, place, "was edited: its name does not agree with its content")
+    evidence = {name: value for name, value in content.items() if name not in {*provenance(), ENTRY}}
+    if path.stem != f"{str(evidence.get('model'))[:10]}-{digest(evidence)[:10]}":
+        checked.wrong(EDITED, path, "was edited: its name does not agree with its content")
 
 
-def _report(place: Place, content: dict[str, Any], checked: VerifiedPart) -> None:
+def _report(path: Place, content: dict[str, Any], checked: VerifiedPart) -> None:
     """A finding, or a remark where the file was written just now."""
     with suppress(ValueError, TypeError):
         if abs(datetime.now(UTC) - datetime.fromisoformat(str(content.get("when", "")))) < JUST_NOW:
             what = "is not in the chain yet: its writer is still active, or was killed a moment ago"
-            checked.remarks.append(f"{checked.name(place)} {what}")
+            checked.remarks.append(f"{checked.name(path)} {what}")
             return
-    checked.wrong(UNCHAINED, place, f"is in no entry of the archive's chain: {REMEDY}")
+    checked.wrong(UNCHAINED, path, f"is in no entry of the archive's chain: {REMEDY}")
 
 
 def check_shard(shard: Place, checked: VerifiedPart) -> VerifiedPart:
     """Check the units of one part of the ledger."""
     known: dict[Place, str] = {}
-    for folder in sorted((place for place in shard.iterdir() if place.is_dir()), key=lambda place: place.name):
+    for folder in sorted((folder for folder in shard.iterdir() if folder.is_dir()), key=lambda folder: folder.name):
         before = ""
-        names = sorted(place.name for place in folder.iterdir() if place.suffix == ".json" and is_number(place.stem))
+        names = sorted(path.name for path in folder.iterdir() if path.suffix == ".json" and is_number(path.stem))
         for count, name in enumerate(names, 1):
-            place = folder / name
+            path = folder / name
             if name != f"{count:06d}.json":
                 checked.wrong(MISSING, folder / f"{count:06d}.json", "is missing, later events of the unit exist")
                 break
-            manifest = checked.manifest(place, SCHEMA)
+            manifest = checked.manifest(path, SCHEMA)
             if manifest is None:
                 break
-            content, own = manifest
+            content, file_hash = manifest
             if content.get("previous") != before and count > 1:
                 checked.wrong(EDITED, folder / names[count - 2], f"is not the event that {name} refers to")
             if folder_of(str(content.get("serial"))) != checked.name(folder).replace("\\", "/"):
-                checked.wrong(EDITED, place, f"names unit {content.get('serial')!r}, which has another folder")
+                checked.wrong(EDITED, path, f"names unit {content.get('serial')!r}, which has another folder")
             if content.get("sequence") != count:
-                checked.wrong(EDITED, place, f"says that it is event {content.get('sequence')!r} of its unit")
-            _check_certified(place, content, known, checked)
-            before = own
+                checked.wrong(EDITED, path, f"says that it is event {content.get('sequence')!r} of its unit")
+            _check_certified(path, content, known, checked)
+            before = file_hash
     return checked
 
 
-def _check_certified(place: Place, content: dict[str, Any], known: dict[Place, str], checked: VerifiedPart) -> None:
+def _check_certified(path: Place, content: dict[str, Any], known: dict[Place, str], checked: VerifiedPart) -> None:
     """Compare the evidence of a certificate with the files of its run."""
     if content.get("action") == "revoke":
         return
     run = checked.root / "runs" / Path(str(content.get("run"))).name
-    for name, expected in checked.named(content, "evidence", place).items():
+    for name, expected in checked.named(content, "evidence", path).items():
         manifest = run / f"{name}.json"
         if not (actual := _hash(manifest, known)):
-            checked.wrong(MISSING, manifest, f"is missing, certificate {checked.name(place)} is based on it")
+            checked.wrong(MISSING, manifest, f"is missing, certificate {checked.name(path)} is based on it")
         elif actual != expected:
-            checked.wrong(EDITED, manifest, f"is not the manifest that certificate {checked.name(place)} is based on")
+            checked.wrong(EDITED, manifest, f"is not the manifest that certificate {checked.name(path)} is based on")
     table = run / "coefficients.json"
     with suppress(ArchiveUnusable):  # the check of the run reports it
         if _hash(table, known) and files.read_json(table).get("sha256") != content.get("coefficients"):
-            checked.wrong(CHANGED, table, f"names other coefficients than certificate {checked.name(place)}")
+            checked.wrong(CHANGED, table, f"names other coefficients than certificate {checked.name(path)}")
 
 
-def _hash(place: Place, known: dict[Place, str]) -> str:
+def _hash(path: Place, known: dict[Place, str]) -> str:
     """Hash of a file, computed once; empty where it is not there."""
-    if place not in known:
-        known[place] = files.sha256(place) if place.is_file() else ""
-    return known[place]
+    if path not in known:
+        known[path] = files.sha256(path) if path.is_file() else ""
+    return known[path]

@@ -27,14 +27,14 @@ SHOWN = 10
 
 def check_mark(archive: Archive, checked: VerifiedPart) -> None:
     """The file ``archive.json``, which the chain does not name, must have its constant content."""
-    place, expected = archive.root / "archive.json", archive.mark
+    path, expected = archive.root / "archive.json", archive.mark
     try:
-        if place.read_bytes() != expected:
-            checked.wrong(CHANGED, place, f"is not the content of every archive, which is {expected.decode().split()}")
+        if path.read_bytes() != expected:
+            checked.wrong(CHANGED, path, f"is not the content of every archive, which is {expected.decode().split()}")
     except FileNotFoundError:
-        checked.wrong(MISSING, place, "is missing, every archive has it")
+        checked.wrong(MISSING, path, "is missing, every archive has it")
     except OSError:
-        checked.wrong(UNREADABLE, place, "cannot be read")
+        checked.wrong(UNREADABLE, path, "cannot be read")
 
 
 def check_surroundings(archive: Archive, checked: VerifiedPart) -> None:
@@ -42,12 +42,12 @@ def check_surroundings(archive: Archive, checked: VerifiedPart) -> None:
     if not isinstance(archive.root, Path):  # an object store has no links, and its listing is slow
         return
     strangers: list[str] = []
-    for name, place in _all(archive.root):
-        if not place.is_symlink() and not OURS.fullmatch(name) and files.TEMPORARY not in name:
+    for name, path in _all(archive.root):
+        if not path.is_symlink() and not OURS.fullmatch(name) and files.TEMPORARY not in name:
             with suppress(OSError):
-                if place.stat().st_size <= KEY_BYTES and KEY_MARK in place.read_bytes():
+                if path.stat().st_size <= KEY_BYTES and KEY_MARK in path.read_bytes():
                     what = "is a private key: who can edit the archive could sign with it; move it out"
-                    checked.wrong(SIGNATURE, place, what)
+                    checked.wrong(SIGNATURE, path, what)
             strangers.append(name)
     if strangers:
         more = f" and {len(strangers) - SHOWN} more" if len(strangers) > SHOWN else ""
@@ -60,10 +60,10 @@ def check_links(archive: Archive, folders: Iterable[Place], checked: VerifiedPar
         if not isinstance(folder, Path):  # an object store has no links
             continue
         top = folder.parent == archive.root  # may be a link to another disk
-        for place in (str(folder),) if folder.is_symlink() and not top else _links(str(folder)):
+        for link in (str(folder),) if folder.is_symlink() and not top else _links(str(folder)):
             # a link is no file of the archive: its target can be changed elsewhere
-            what = f"is a link to {os.readlink(place)}: replace it by the content"  # noqa: PTH115 - as it was written
-            checked.wrong(FOREIGN, Path(place), what)
+            what = f"is a link to {os.readlink(link)}: replace it by the content"  # noqa: PTH115 - as it was written
+            checked.wrong(FOREIGN, Path(link), what)
 
 
 def _links(folder: str) -> Iterator[str]:
@@ -72,16 +72,16 @@ def _links(folder: str) -> Iterator[str]:
         inside = list(os.scandir(folder))
     except OSError:  # a file, or told by the other checks
         return
-    for one in inside:
-        if one.is_symlink():
-            yield one.path
-        elif one.is_dir(follow_symlinks=False):
-            yield from _links(one.path)
+    for entry in inside:
+        if entry.is_symlink():
+            yield entry.path
+        elif entry.is_dir(follow_symlinks=False):
+            yield from _links(entry.path)
 
 
 def _all(root: Path) -> Iterator[tuple[str, Path]]:
     """Files below a folder by name."""
     for folder, _, names in os.walk(root):
         for name in sorted(names):
-            place = Path(folder) / name
-            yield place.relative_to(root).as_posix(), place
+            path = Path(folder) / name
+            yield path.relative_to(root).as_posix(), path

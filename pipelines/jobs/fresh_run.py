@@ -9,7 +9,7 @@ from schemas.errors import ArchiveUnusable
 
 
 def fresh_run_of(archive: Archive, run: Run) -> Run | None:
-    """The newest finished run that measured the same units in the same way again; None where there is none."""
+    """The newest finished run that measured the units again in the same way; None where no run did."""
     if not repeatable(run):
         return None
     about = run.about
@@ -42,7 +42,7 @@ def fresh_repeat(archive: Archive, run: Run) -> int:
 
 
 def _measurement(about: dict[str, Any]) -> tuple[Any, ...]:
-    """What decides on a measurement but the noise: poses and soaks, station, units and their places."""
+    """All that determines a measurement except the noise: poses and soaks, station, units and their slots."""
     recipe = {key: value for key, value in about["recipe"].items() if key not in ANALYSIS_KEYS}
     lot = {key: value for key, value in about["lot"].items() if key != "repeat"}
     return recipe, lot, about["station"].get("name")

@@ -92,12 +92,12 @@ class Job:
 
     @property
     def terms(self) -> BudgetTerms:
-        """What is stated of the uncertainty."""
+        """The statements from which the uncertainty budget is computed."""
         return budget_terms(self.recipe, self.station, self.limits)
 
     @property
     def capture_id(self) -> str:
-        """Name of the capture: the same for recipes that differ only in what is made of the data."""
+        """Name of the capture; recipes that differ only in the analysis of the data share it."""
         if self.captured:
             return self.captured
         unmoved, decided = {*GUARDS}, dict[str, Any]()
@@ -113,8 +113,8 @@ class Job:
             unmoved.add("equipment")
         station = self.station.model_dump(mode="json", exclude=unmoved)
         after = {"parents": list(self.parents)} if self.parents else {}
-        own = {"own_files": hashes} if (hashes := self.own_files) else {}
-        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after, **own, **decided}
+        files = {"own_files": hashes} if (hashes := self.own_files) else {}
+        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after, **files, **decided}
         return digest(content)[:16]
 
     @property
@@ -140,7 +140,7 @@ class Job:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What is kept beside the run for readers."""
+        """The content of ``run.json`` that describes the run to readers."""
         return {
             "recipe": self.recipe.model_dump(mode="json"),
             "limits": self.limits.model_dump(mode="json"),
@@ -149,13 +149,13 @@ class Job:
             "capture": self.capture_id,
             **({"parents": list(self.parents)} if self.parents else {}),
             **({"prior": self.prior.model_dump()} if self.prior is not None else {}),
-            **({"own_files": own} if not self.captured and (own := self.own_files) else {}),
+            **({"own_files": hashes} if not self.captured and (hashes := self.own_files) else {}),
         }
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a command or a schedule asks for: plain values that a job is made from.
+    """The plain values from which a command or a schedule makes a job.
 
     ``slots`` say where each of the ``units`` sits; slot by slot from 0 where there are none. ``faults`` are trouble for a
     simulated station, written as on the command line.
@@ -175,7 +175,7 @@ class Request:
         return {**asdict(self), "station": str(self.station) if self.station else None, **lists}
 
     def fillings(self, slots: int) -> list[Self]:
-        """The request in portions that fit a fixture of so many slots; a slot map is one filling as it is."""
+        """The request in portions that fit a fixture of so many slots; a slot map is a single filling."""
         if self.recipe.startswith(OF_RUN):
             return [self]
         named = self.units or tuple(units_of(self.recipe))
@@ -186,7 +186,7 @@ class Request:
     def job(self, archive: Archive | None = None) -> Job:
         """The job that is asked for, with everything refused that cannot work, before anything moves.
 
-        archive : where the line's model is released, for recipes that ask for it; the default one where None
+        archive : where the line's model is released, for recipes that ask for it; the default archive where None
         """
         if self.recipe.startswith(OF_RUN):
             return self._of_run(archive)
@@ -258,7 +258,7 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
         recipe = recipe.model_copy(update=model_keys(read_model(model)))
     if effects or model is not None:
         use_formulas(recipe.formulas, f"run {run.id}")
-        # the prior of another model is none of this one
+        # the prior of another model does not fit this model
         recipe = recipe.model_copy(update={"effects": list(effects or recipe.effects), "prior": None})
         refuse_unknown_effects(recipe.effects, "fit")
     chosen = limits_of(about["limits"], UNITS)
@@ -274,7 +274,7 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
 
 
 def measured_again(job: Job, repeat: int) -> Job:
-    """The job of an archived run with another count of repeats: a measurement of its own."""
+    """The job of an archived run with another count of repeats: a separate measurement."""
     if repeat == job.lot.repeat:
         return job
     return replace(job, lot=job.lot.model_copy(update={"repeat": repeat}), captured="")
@@ -297,7 +297,7 @@ def _refuse_more_units_than_slots(job: Job) -> None:
     serials, slots = [unit.serial for unit in job.lot.units], job.station.devices.slots.count
     if len(serials) > slots:
         lots = fillings(serials, slots)
-        commands = ", then ".join(f"--units {','.join(own)}" for own in lots)
+        commands = ", then ".join(f"--units {','.join(serials)}" for serials in lots)
         raise WrongUse(
             f"lot: {len(serials)} units, the fixture has {slots} slots; measure {len(lots)} lots, one after the other: "
             f"{commands}"

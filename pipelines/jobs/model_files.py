@@ -83,8 +83,8 @@ def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
 
 def use_formulas_of(run: Run) -> None:
     """Add the formulas of the model of an archived run to the catalogue of effects."""
-    kept = run.about.get("recipe", {}).get("formulas", [])
-    use_formulas([FormulaSpec.model_validate(spec) for spec in kept], f"run {run.id}")
+    formulas = run.about.get("recipe", {}).get("formulas", [])
+    use_formulas([FormulaSpec.model_validate(spec) for spec in formulas], f"run {run.id}")
 
 
 def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
@@ -170,7 +170,7 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
 
 
 def reduced(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
-    """The text of the next version of a model without an effect, its comments kept, and the model as it then is.
+    """The text of the next version of a model without an effect, with its comments, and that version of the model.
 
     Raises RecipeInvalid: the text is no model, the effect is not in it, or it is the only one.
     """

@@ -45,7 +45,7 @@ def with_moved_poses(recipe: Recipe, moves: dict[str, Angles], where: str) -> Re
     """The recipe with the poses of these names at other angles; checked as a recipe file is.
 
     Raises WrongUse: the recipe has no pose of a name.
-    Raises RecipeInvalid: the poses are useless for a fit, or a pose for verification coincides with one of the fit.
+    Raises RecipeInvalid: the poses are useless for a fit, or a pose for verification coincides with a pose of the fit.
     """
     if not moves:
         return recipe

@@ -76,10 +76,14 @@ class _Archived:
             raise NotIdentified(
                 f"prior: no calibration of {self.device} with this model; leave [prior] out until there are some"
             )
-        number = np.unique([one.run for one in first], return_inverse=True)[1].astype(np.int64)
-        known = np.stack([one.values for one in first]), np.stack([one.covariance for one in first]), number
+        number = np.unique([calibration.run for calibration in first], return_inverse=True)[1].astype(np.int64)
+        known = (
+            np.stack([calibration.values for calibration in first]),
+            np.stack([calibration.covariance for calibration in first]),
+            number,
+        )
         found = family_of(*known)
-        of_groups = self._of_groups(found, known, [one.group for one in first], lot)
+        of_groups = self._of_groups(found, known, [calibration.group for calibration in first], lot)
         pairs = [pair for many in self.units.values() for pair in pairwise(many)]
         if len(pairs) < PAIRS:
             return replace(found, own=of_groups)
@@ -88,8 +92,8 @@ class _Archived:
         change = change_of(np.stack([b.values - a.values for a, b in pairs]), both)
         again = [unit for unit in self.units if unit in lot]
         self.groups = {unit: group for unit, group in self.groups.items() if unit not in again}
-        own = {unit: self._own(found, self.units[unit][-1], change, days.mean()) for unit in again}
-        return replace(found, own={**of_groups, **own})
+        of_units = {unit: self._by_last_calibration(found, self.units[unit][-1], change, days.mean()) for unit in again}
+        return replace(found, own={**of_groups, **of_units})
 
     def _of_groups(
         self, found: Family, known: tuple[Array, Array, Index], group: list[str], lot: set[str]
@@ -108,14 +112,14 @@ class _Archived:
         return {unit: groups.of(named[unit]) for unit in self.groups}
 
     @staticmethod
-    def _own(found: Family, last: _Calibrated, change: Array, days: float) -> tuple[Array, Array]:
+    def _by_last_calibration(found: Family, last: _Calibrated, change: Array, days: float) -> tuple[Array, Array]:
         """Mean and covariance of a unit by its last calibration: its change grows with time, as a walk does."""
         past = max(1.0, (datetime.now(UTC).timestamp() / DAY_S - last.day) / max(days, 1.0 / DAY_S))
         both = combined(last.values, last.covariance, found.mean, found.precision)
         return both.coefficients, both.covariance + past * change[..., None] * np.eye(change.shape[-1])
 
 
-def stored_family(recipe: Recipe, own: Archive, units: set[str], kind: str) -> StoredFamily | None:
+def stored_family(recipe: Recipe, default: Archive, units: set[str], kind: str) -> StoredFamily | None:
     """The family of a recipe's device in the archive that its ``[prior]`` names; None where it has none.
 
     Every other unit counts once, with its first calibration by the same model; calibrations with a prior say nothing new of the
@@ -124,9 +128,9 @@ def stored_family(recipe: Recipe, own: Archive, units: set[str], kind: str) -> S
 
     Parameters
     ----------
-    own : the archive where none is named
+    default : the archive where none is named
     units : those of the lot
-    kind : of the station: simulated units say nothing of real ones
+    kind : of the station: simulated units say nothing of real units
 
     Raises
     ------
@@ -135,7 +139,7 @@ def stored_family(recipe: Recipe, own: Archive, units: set[str], kind: str) -> S
     """
     if recipe.prior is None:
         return None
-    archive = Archive(recipe.prior.archive) if recipe.prior.archive else own
+    archive = Archive(recipe.prior.archive) if recipe.prior.archive else default
     archive.refuse_none()
     since = "" if recipe.prior.since is None else recipe.prior.since.isoformat()
     archived = _Archived(recipe, archive, since, kind)
@@ -155,14 +159,14 @@ def stored_family(recipe: Recipe, own: Archive, units: set[str], kind: str) -> S
 
 
 def planned_precision(recipe: Recipe, archive: str | None, kind: str) -> Array | None:
-    """Precision (m, p, p) of the prior of a recipe that is planned, 1/g²; None without one.
+    """Precision (m, p, p) of the prior of a recipe that is planned, 1/g²; None without a prior.
 
     Where all units that the recipe names have earlier calibrations, it is that of the least known of them. Outputs become g by
     the scale of the family.
 
     Parameters
     ----------
-    archive : address; the default one where None
+    archive : address; the default archive where None
     """
     stored = stored_family(recipe, Archive(archive), set(recipe.units), kind)
     found = family(stored)
@@ -187,6 +191,6 @@ def family(stored: StoredFamily | None) -> Family | None:
     """The family that a job keeps."""
     if stored is None:
         return None
-    own = {unit: (np.array(one.mean), np.array(one.covariance)) for unit, one in stored.own.items()}
+    of_units = {unit: (np.array(known.mean), np.array(known.covariance)) for unit, known in stored.own.items()}
     mean, unit, lot, error, tails = map(np.array, (stored.mean, stored.unit, stored.lot, stored.error, stored.tails))
-    return Family(mean, unit, lot, error, stored.units, stored.lots, tails, own)
+    return Family(mean, unit, lot, error, stored.units, stored.lots, tails, of_units)

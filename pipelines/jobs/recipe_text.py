@@ -22,7 +22,7 @@ def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
 
     remarks : lines for the head of the file, without the sign of a remark
 
-    Raises WrongUse: the model has formulas of its own, which only a model file can hold.
+    Raises WrongUse: the model has formulas, which only a model file can hold.
     """
     if recipe.formulas:
         raise WrongUse(
@@ -70,7 +70,7 @@ def _angles(pose: Pose) -> list[float]:
 
 
 def limits_from(limits: str, home: Path, folder: Path) -> str:
-    """A recipe's limits as a recipe in another folder names them: built-in ones by name, a file by its way from there."""
+    """A recipe's limits as a recipe in another folder names them: built-in limits by name, a file by its path from there."""
     beside = home / limits
     return os.path.relpath(beside, folder) if beside.is_file() else limits
 
@@ -79,8 +79,8 @@ def _item(key: str, value: Any) -> Item:
     """A value as an item of the document; lists that are too long for a line stand one entry a line."""
     if isinstance(value, list) and value and isinstance(value[0], dict):
         several = tomlkit.aot()
-        for one in value:
-            several.append(_table(one))
+        for row in value:
+            several.append(_table(row))
         return several
     if isinstance(value, dict):
         return _table(value)

@@ -95,12 +95,12 @@ def folder_of(name: str) -> Path:
 
 
 def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
-    """The limits that a recipe names: a file beside the recipe or anywhere, or built-in ones."""
+    """The limits that a recipe names: a file beside the recipe or anywhere, or built-in limits."""
     return read_limits(recipe.limits, folder)
 
 
 def read_limits(name: str, folder: Path | None = None) -> Limits:
-    """The limits of a file in a folder or anywhere, of the user, or the built-in ones of this name."""
+    """The limits of a file in a folder or anywhere, of the user, or the built-in limits of this name."""
     from pipelines.stages.figures import UNITS
 
     known = sample_names("limits-")
@@ -118,7 +118,7 @@ def read_limits(name: str, folder: Path | None = None) -> Limits:
 
 
 def _judged_rightly(limits: Limits, name: str) -> Limits:
-    """The limits; a least value of a figure of which only the largest axis is kept would be judged on the best axis."""
+    """The limits; a least value of a figure of which only the largest axis is stated would be judged on the best axis."""
     from pipelines.procedures import FIGURES
 
     for figure, limit in limits.figures.items():
@@ -134,7 +134,7 @@ def _judged_rightly(limits: Limits, name: str) -> Limits:
 def lot_of(
     recipe: Recipe, serials: Sequence[str], slots: Sequence[int] = (), *, seed: int | None = None, repeat: int = 0
 ) -> Lot:
-    """The lot to measure: the serials given, or else the recipe's, each in its slot or one slot after the other."""
+    """The lot to measure: the serials given, or else the recipe's, each in its slot, or in slots from 0 on."""
     named = list(serials) or recipe.units
     if not named:
         raise WrongUse(

@@ -38,7 +38,7 @@ class SeenReference(TypedDict):
 
 
 class ReferencesDocument(TypedDict):
-    """What the common residual of a run's units says of the stated table."""
+    """The judgement of the stated errors of the table by the residuals that a run's units share."""
 
     worse: Annotated[bool | None, "whether the table is worse than stated; null: cannot be judged, see `reason`"]
     reason: Annotated[str | None, "why it cannot be judged"]
@@ -61,7 +61,7 @@ def references_of(run: Run) -> ReferencesDocument | None:
     poses = (run.about.get("recipe") or {}).get("poses")
     if terms is None or terms.stated is None or not (run.about.get("capture") and poses and {*READ} <= {*tables}):
         return None
-    if not any(one.standard().u > 0.0 for name, one in terms.stated.entries.items() if name in JUDGED):
+    if not any(entry.standard().u > 0.0 for name, entry in terms.stated.entries.items() if name in JUDGED):
         return None
     key = (str(terms.document()), *(run.manifest(name)["sha256"] for name in READ))
     if key not in _judged:
@@ -81,30 +81,30 @@ def references_of(run: Run) -> ReferencesDocument | None:
 def _document(judged: LotReferences | str, stated: Uncertainty) -> ReferencesDocument:
     if isinstance(judged, str):
         return {"worse": None, "reason": judged, "p_value": None, "along_p": None, "seen": [], "not_seen": []}
-    found = {one.name for one in judged.found}
-    every = [*judged.found, *(one for one in judged.looked if one.name not in found)]
-    told_from = {one.name: one.seen_from for one in (*judged.found, *judged.looked)}
+    found = {size.name for size in judged.found}
+    every = [*judged.found, *(size for size in judged.looked if size.name not in found)]
+    told_from = {size.name: size.seen_from for size in (*judged.found, *judged.looked)}
     return {
         "worse": bool(found),
         "reason": None,
         "p_value": judged.p_value,
         "along_p": judged.along_p,
-        "seen": [_seen(one, stated, told_from=told_from[one.name], worse=one.name in found) for one in every],
+        "seen": [_seen(size, stated, told_from=told_from[size.name], worse=size.name in found) for size in every],
         "not_seen": [name for name in IMITATED if name in stated.entries and not stated.entries[name].exact],
     }
 
 
 def _seen(size: Size, stated: Uncertainty, *, told_from: float, worse: bool) -> SeenReference:
     standard = stated.entries[size.name].standard()
-    own = standard.u / TO_SI[standard.unit]
+    u = standard.u / TO_SI[standard.unit]
     return {
         "entry": size.name,
         "unit": standard.unit,
-        "stated": own,
-        "found": own * size.factor,
-        "low": own * size.low,
-        "high": _finite(own * size.high),
-        "told_from": _finite(own * told_from),
+        "stated": u,
+        "found": u * size.factor,
+        "low": u * size.low,
+        "high": _finite(u * size.high),
+        "told_from": _finite(u * told_from),
         "worse": worse,
         "rivals": list(size.rivals),
     }
@@ -118,10 +118,10 @@ UNITS = {"urad": "µrad", "arcsec": "″", "deg": "°"}
 
 
 def contradiction(judged: ReferencesDocument) -> str:
-    """What is stated and what was found, where the table is worse than stated; else empty."""
+    """A sentence on stated and found errors where the table is worse than stated; else empty."""
     if not judged["worse"]:
         return ""
-    parts = [_found(one) for one in judged["seen"] if one["worse"]]
+    parts = [_found(reference) for reference in judged["seen"] if reference["worse"]]
     text = f"the table is worse than stated (p {equal(judged['p_value'] or 0.0)}): {'; '.join(parts)}"
     if judged["along_p"] is not None and judged["along_p"] < LEVEL:
         text += (
@@ -148,8 +148,12 @@ def _digits(value: float, count: int = 3) -> str:
 
 def unseen(judged: ReferencesDocument) -> str:
     """From which size on this run would show an error, and which errors it cannot show."""
-    told = [f"{LABELS[one['entry']]} {_from(one)}" for one in judged["seen"] if one["told_from"] is not None]
-    none = [LABELS[one["entry"]] for one in judged["seen"] if one["told_from"] is None]
+    told = [
+        f"{LABELS[reference['entry']]} {_from(reference)}"
+        for reference in judged["seen"]
+        if reference["told_from"] is not None
+    ]
+    none = [LABELS[reference["entry"]] for reference in judged["seen"] if reference["told_from"] is None]
     none += [f"{LABELS[name]} (acts as {IMITATED[name]})" for name in judged["not_seen"]]
     parts = [f"with 90 % probability this run would have shown: {', '.join(told)}"] if told else []
     parts += [f"it cannot show: {', '.join(none)}"] if none else []

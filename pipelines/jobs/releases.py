@@ -1,8 +1,8 @@
 """Releases of models to the line: records in the archive that are never changed, and the evidence for them.
 
 Every record has its scope (device, station) and its first day of use. A record for the same device and station has priority over
-one for the device only, and this over one for all; among records of equal scope the one with the latest date that is not in the
-future applies, and of two with the same date the one that was written last.
+a record for the device only, and this over a record for all; among records of equal scope that with the latest date not in the
+future applies, and of two with the same date that written last.
 """
 
 from collections.abc import Mapping
@@ -75,24 +75,24 @@ def keep_evidence(archive: Archive, change: ModelChange, document: Mapping[str, 
     content = {"schema": SCHEMA, "model": model, "runs": sorted(runs), **document}
     name = f"{model[:10]}-{digest(content)[:10]}"
     archive.prepare()
-    place = archive.root / EVIDENCE / f"{name}.json"
-    if not place.is_file():
-        files.publish(place, files.manifest_bytes({**provenance(), **content}))
+    path = archive.root / EVIDENCE / f"{name}.json"
+    if not path.is_file():
+        files.publish(path, files.manifest_bytes({**provenance(), **content}))
     return name
 
 
 def evidence_for(archive: Archive, change: ModelChange, device: str, station: str) -> dict[str, Any] | None:
-    """The newest what-if of a model with lots of this device and station; None without one."""
+    """The newest what-if of a model with lots of this device and station; None where there was none."""
     model = model_digest(change)
     matches: list[dict[str, Any]] = []
-    for place in (archive.root / EVIDENCE).glob(f"{model[:10]}-*.json"):
-        content = files.read_json(place)
+    for path in (archive.root / EVIDENCE).glob(f"{model[:10]}-*.json"):
+        content = files.read_json(path)
         groups = content.get("groups", [])
         if content.get("model") == model and any(
             _matches(device, row["device"]) and _matches(station, row["station"]) for row in groups
         ):
-            matches.append({**content, "name": place.stem})
-    return max(matches, key=lambda one: str(one["when"]), default=None)
+            matches.append({**content, "name": path.stem})
+    return max(matches, key=lambda what_if: str(what_if["when"]), default=None)
 
 
 def release(
@@ -127,10 +127,10 @@ def release(
         "forced": force,
     }
     with alone(archive.root / FOLDER, wait=True):
-        number = max((one.number for one in releases(archive)), default=0) + 1  # a record may have been removed
-        place = _place(archive, number)
-        files.publish_first(place, files.manifest_bytes({**provenance(), **content, "number": number}))
-        sealed = {f"{FOLDER}/{place.name}": files.sha256(place)}
+        number = max((record.number for record in releases(archive)), default=0) + 1  # a record may have been removed
+        path = _path(archive, number)
+        files.publish_first(path, files.manifest_bytes({**provenance(), **content, "number": number}))
+        sealed = {f"{FOLDER}/{path.name}": files.sha256(path)}
         hash_chain.append(archive.root, "release", sealed, {**provenance(), "release": number})
     return _read(archive, number)
 
@@ -152,15 +152,21 @@ def _refuse_without(evidence: dict[str, Any] | None, change: ModelChange, device
 
 def releases(archive: Archive) -> list[Release]:
     """Every record, in the order of writing."""
-    stems = (place.stem for place in (archive.root / FOLDER).glob("*.json"))
+    stems = (path.stem for path in (archive.root / FOLDER).glob("*.json"))
     return [_read(archive, number) for number in sorted(int(stem) for stem in stems if hash_chain.is_number(stem))]
 
 
 def released(archive: Archive, device: str, station: str, when: datetime) -> Release | None:
-    """The record of the line's model for a device and station at a time; None without one."""
-    own = [one for one in releases(archive) if _matches(one.device, device) and _matches(one.station, station)]
-    holding = [one for one in own if one.since <= when]
-    return max(holding, key=lambda one: (bool(one.station), bool(one.device), one.since, one.number), default=None)
+    """The record of the line's model for a device and station at a time; None where no record applies."""
+    matching = [
+        record for record in releases(archive) if _matches(record.device, device) and _matches(record.station, station)
+    ]
+    holding = [record for record in matching if record.since <= when]
+    return max(
+        holding,
+        key=lambda record: (bool(record.station), bool(record.device), record.since, record.number),
+        default=None,
+    )
 
 
 def line_model(archive: Archive, device: str, station: str, when: datetime | None = None) -> dict[str, Any]:
@@ -172,7 +178,9 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
     in_force = released(archive, device, station, at)
     if in_force is None:
         there = releases(archive)
-        known = ", ".join(f"{one.device or 'every device'} from {one.since:%Y-%m-%d}" for one in there) or "none"
+        known = (
+            ", ".join(f"{record.device or 'every device'} from {record.since:%Y-%m-%d}" for record in there) or "none"
+        )
         raise RecipeInvalid(
             f"recipe: key 'model': for {device} on {station} no model is released at {at:%Y-%m-%d} "
             f"(released: {known}); release one with 'tumbleline release', or name effects in the recipe",
@@ -182,7 +190,7 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
 
 
 def planned_recipe(name: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
-    """The recipe to be planned, with another model where one is given; the archive is read only for the line's model.
+    """The recipe to be planned, with another model where that is given; the archive is read only for the line's model.
 
     effects, model : a list of effects, or a model file; empty or None if not given
     """
@@ -199,12 +207,12 @@ def planned_recipe(name: str, effects: str, model: Path | None, archive: str | N
     return loaded.model_copy(update={"effects": list(chosen)}) if chosen else loaded
 
 
-def _place(archive: Archive, number: int) -> Any:
+def _path(archive: Archive, number: int) -> Any:
     return archive.root / FOLDER / f"{number:06d}.json"
 
 
 def _read(archive: Archive, number: int) -> Release:
-    content = files.read_json(_place(archive, number))
+    content = files.read_json(_path(archive, number))
     model = content["model"]
     as_written = ("device", "station", "reason", "evidence", "forced", "who", "when")
     formulas = tuple(FormulaSpec.model_validate(formula) for formula in model["formulas"])

@@ -22,7 +22,7 @@ LONGEST_SLOT = 4
 
 @dataclass(frozen=True)
 class Seating:
-    """Serial numbers, and the slot of each from a slot map; without one the units sit in the slots from 0 on."""
+    """Serial numbers, and the slot of each from a slot map; without a map the units sit in the slots from 0 on."""
 
     units: tuple[str, ...] = ()
     slots: tuple[int, ...] = ()
@@ -82,7 +82,7 @@ def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
     where = f"slot map {path.name}"
     lines = content.splitlines()
     first = lines[0] if lines else ""
-    divider = next((one for one in DIVIDERS if one in first), DIVIDERS[0])
+    divider = next((sign for sign in DIVIDERS if sign in first), DIVIDERS[0])
     with foreign(f"{where}: not a table of text", "save it as CSV again", WrongUse):
         rows = list(csv.reader(io.StringIO(content), delimiter=divider))
     head = [cell.strip().lower() for cell in rows[0]] if rows else []

@@ -28,7 +28,7 @@ def budget_terms(recipe: Recipe, station: Any, limits: Limits | None) -> BudgetT
     """The terms of a job's budget; the station of an archived job may be its document, as it was written."""
     stated, pace, given = (getattr(station, name, None) for name in ("uncertainty", "pace", "reference"))
     stated = None if stated is None else Uncertainty.model_validate(stated)
-    references = [Reference.model_validate(one) for one in given or []]
+    references = [Reference.model_validate(reference) for reference in given or []]
     room = Pace.model_validate(pace or {}).room_C
     months = VALIDITY_MONTHS if limits is None else limits.longest_validity_months
     return terms_of(recipe, stated, references, room, months)
@@ -67,9 +67,9 @@ def asked_of_noise(recipe: Recipe, station: StationConfig, limits: Limits) -> di
     terms = planned_terms(recipe, station, limits)
     references = dict.fromkeys(asked, 0.0)
     if asked and terms.stated is not None:
-        for one in reachable(without_noise(recipe, station), terms, recipe.effects):
-            if one.quantity in references:
-                references[one.quantity] = max(references[one.quantity], one.u)
+        for reach in reachable(without_noise(recipe, station), terms, recipe.effects):
+            if reach.quantity in references:
+                references[reach.quantity] = max(references[reach.quantity], reach.u)
     allowed = {
         effect: (value / limits.coverage_factor) ** 2 - references[effect] ** 2 for effect, value in asked.items()
     }
@@ -88,7 +88,7 @@ def refuse_unusable_stop(recipe: Recipe, station: StationConfig, limits: Limits)
     """Refuse a ``[stop]`` that could never end the lot, or of which a key could never do what it says.
 
     Raises RecipeInvalid: it has no poses, asks for effects that the dwells can never show, for less than the references allow,
-    or for dwells no longer than the planned ones.
+    or for dwells no longer than planned.
     """
     terms = recipe.stop
     if terms is None:
@@ -130,7 +130,7 @@ def without_noise(recipe: Recipe, station: StationConfig) -> PlannedDwells:
 
 
 def _supply_not_measured(terms: BudgetTerms) -> str:
-    """What to do about the supply of a device that follows it, where it is not measured."""
+    """Advice for a device whose output follows a supply that is not measured; empty for other devices."""
     supply = None if terms.stated is None else terms.stated.supply
     if supply is None or terms.stability is None or terms.stability.ratiometric == 0.0 or supply.ratio_measured:
         return ""
@@ -145,11 +145,11 @@ def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:
     from stations.plant.preset import load_preset  # a station of hardware has no plant
 
     preset = load_preset(recipe.device, station.simulation.preset_overrides)
-    own = preset.stability
-    if own is not None and preset.zero_level > 0.0:
+    stability = preset.stability
+    if stability is not None and preset.zero_level > 0.0:
         electrical = {"supply_V": preset.supply_V, "zero_level_g": preset.zero_level / preset.scale}
-        own = own.model_copy(update=electrical)
-    return recipe.model_copy(update={"stability": own})
+        stability = stability.model_copy(update=electrical)
+    return recipe.model_copy(update={"stability": stability})
 
 
 def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
@@ -162,9 +162,9 @@ def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
             refuse_untraced(recipe.uncertainty, station.reference, simulated=station.kind == "simulated")
         except ValueError as problem:
             raise RecipeInvalid(f"recipe {recipe.name}: {problem}", key="uncertainty") from None
-    stated, own = merged(station.uncertainty, recipe.uncertainty), recipe.stability
+    stated, stability = merged(station.uncertainty, recipe.uncertainty), recipe.stability
     measured = stated is not None and stated.supply is not None and stated.supply.ratio_measured
-    if own is not None and own.ratiometric > 0.0 and own.supply_V is None and measured:
+    if stability is not None and stability.ratiometric > 0.0 and stability.supply_V is None and measured:
         raise RecipeInvalid(
             f"recipe {recipe.name}: key 'stability.supply_V': missing, station {station.name} measures the supply that the "
             "output follows, and the nominal one is needed; add supply_V = … in V to [stability]",

@@ -13,7 +13,7 @@ from pipelines.lineage.graph import Graph, Node, ProvActivity
 
 MADE = ("who", "where", "when", "code", "key", "software", "libraries", "schema", "parameters", "taken_from")
 RAW = "records"
-ELSEWHERE = {"recipe", "limits", "station", "signature"}  # parts of ``run.json`` with nodes of their own, or none
+ELSEWHERE = {"recipe", "limits", "station", "signature"}  # parts of ``run.json`` with separate nodes, or none
 
 
 class Gatherer:
@@ -31,10 +31,10 @@ class Gatherer:
         self._runs.add(run.id)
         about = run.about
         settings = self._settings(about)
-        own = {key: value for key, value in about.items() if key not in ELSEWHERE}
-        start = self.graph.add(Node(f"runs/{run.id}", "run", run.id, f"runs/{run.id}/run.json", about=own))
-        earlier = [str(one) for one in (about.get("rerun_of"), *about.get("parents", ())) if one]
-        earlier = [one for one in dict.fromkeys(earlier) if one != run.id]
+        content = {key: value for key, value in about.items() if key not in ELSEWHERE}
+        start = self.graph.add(Node(f"runs/{run.id}", "run", run.id, f"runs/{run.id}/run.json", about=content))
+        earlier = [str(name) for name in (about.get("rerun_of"), *about.get("parents", ())) if name]
+        earlier = [name for name in dict.fromkeys(earlier) if name != run.id]
         raw = self._capture(str(about.get("capture") or ""), about, settings)
         for name in earlier:
             other = self._other(name)
@@ -59,13 +59,13 @@ class Gatherer:
     def certificates_of(self, run: Run) -> list[str]:
         """Add the certificates of the units of a run; return their ids."""
         serials = [unit["serial"] for unit in run.about.get("lot", {}).get("units", [])]
-        own = (
+        calibrations = (
             calibration
             for serial in serials
             for calibration in Ledger(self.archive).calibrations(serial)
             if calibration.run == run.id
         )
-        return [self._certificate(one) for one in own]
+        return [self._certificate(calibration) for calibration in calibrations]
 
     def _other(self, name: str) -> Run | None:
         return self.archive.run(name) if name in self.archive.run_ids() else None
@@ -89,14 +89,14 @@ class Gatherer:
             return self._captures.get(capture, [])
         top = self.archive.root / "captures" / capture
         ids: list[str] = []
-        for folder in sorted(top.iterdir(), key=lambda place: place.name) if top.is_dir() else []:
+        for folder in sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []:
             if not folder.name.isdigit() or not (folder / "record.json").is_file():
                 continue
             content = files.read_json(folder / "record.json").get("content", {})
             for name, value in sorted(content.items()):
-                place = f"captures/{capture}/{folder.name}/{name}"
+                file = f"captures/{capture}/{folder.name}/{name}"
                 kind = "samples" if name.startswith("samples") else "table"
-                ids.append(self.graph.add(Node(place, kind, f"record {int(folder.name)} {name}", place, str(value))))
+                ids.append(self.graph.add(Node(file, kind, f"record {int(folder.name)} {name}", file, str(value))))
         self._captures[capture] = ids
         step = {key: about[key] for key in ("who", "where", "when") if key in about} | {"capture": capture}
         if (top / COMPLETE).is_file():
@@ -107,14 +107,14 @@ class Gatherer:
     def _tables(self, run: Run, raw: list[str], start: str) -> None:
         """Add the tables of a run, stage by stage."""
         places = sorted(run.path.glob("*.json"), key=lambda path: path.name)
-        manifests = {one.stem: files.read_json(one) for one in places if one.name not in {"run.json", SEALED}}
+        manifests = {path.stem: files.read_json(path) for path in places if path.name not in {"run.json", SEALED}}
         steps: dict[str, list[str]] = {}
         for name, content in manifests.items():
             kind, ending = ("report", "html") if name == "report" else ("table", "parquet")
-            place = f"runs/{run.id}/{name}.{ending}"
+            file = f"runs/{run.id}/{name}.{ending}"
             about = {key: content.get(key) for key in ("rows", "schema")} | {"manifest": f"runs/{run.id}/{name}.json"}
-            self.graph.add(Node(place, kind, name, place, str(content.get("sha256", "")), about))
-            steps.setdefault(f"{content.get('stage')} {content.get('key')} of {run.id}", []).append(place)
+            self.graph.add(Node(file, kind, name, file, str(content.get("sha256", "")), about))
+            steps.setdefault(f"{content.get('stage')} {content.get('key')} of {run.id}", []).append(file)
         for step, made in steps.items():
             content = manifests[made[0].rpartition("/")[2].rpartition(".")[0]]
             used = [start]
@@ -132,9 +132,9 @@ class Gatherer:
 
     def _certificate(self, calibration: Calibration) -> str:
         event = calibration.event
-        place = f"{folder_of(event.serial)}/{event.sequence:06d}.json"
+        path = f"{folder_of(event.serial)}/{event.sequence:06d}.json"
         name = self.graph.add(
-            Node(place, "certificate", calibration.certificate, place, about=dict(calibration.document()))
+            Node(path, "certificate", calibration.certificate, path, about=dict(calibration.document()))
         )
         rests = tuple(f"runs/{event.run}/{table}.parquet" for table, _ in event.evidence)
         used = tuple(node for node in (*rests, f"runs/{event.run}") if node in self.graph.nodes)

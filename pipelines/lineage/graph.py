@@ -13,7 +13,7 @@ STATED = ("code", "key", "schema", "reason", "taken_from")  # of a step, in exch
 class Node:
     """A node of the graph, also in the JSON document.
 
-    id : unique; for a file of the archive its place below the root
+    id : unique; for a file of the archive its path below the root
     kind : ``certificate``, ``table``, ``report``, ``samples``, ``source``, ``run``, ``recipe``, ``limits``, ``station`` or
     ``reference``; label : the name in trees and pages; sha256 : hash of the file; about : further properties
     """
@@ -83,11 +83,11 @@ class Graph:
         up, steps_up = self._reached(start, forward=False)
         down, steps_down = self._reached(start, forward=True)
         beside = {node for name in steps_down for node in self.steps[name].used} & self.nodes.keys()
-        kept = up | down | {node for node in beside if self.nodes[node].kind in {"recipe", "limits", "station"}}
-        part = Graph({name: node for name, node in self.nodes.items() if name in kept})
+        names = up | down | {node for node in beside if self.nodes[node].kind in {"recipe", "limits", "station"}}
+        part = Graph({name: node for name, node in self.nodes.items() if name in names})
         reached = steps_up | steps_down
         for step in (step for name, step in self.steps.items() if name in reached):
-            used, made = (tuple(node for node in nodes if node in kept) for nodes in (step.used, step.made))
+            used, made = (tuple(node for node in nodes if node in names) for nodes in (step.used, step.made))
             part.put(replace(step, used=used, made=made))
         return part
 
@@ -103,7 +103,7 @@ class Graph:
         while open_ids:
             for step in links.get(open_ids.pop(), []):
                 steps.add(step.id)
-                new = {one for one in (step.made if forward else step.used) if one in self.nodes} - nodes
+                new = {node for node in (step.made if forward else step.used) if node in self.nodes} - nodes
                 nodes |= new
                 open_ids += new
         return nodes, steps

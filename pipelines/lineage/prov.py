@@ -36,7 +36,7 @@ def prov_of(traced: Lineage) -> dict[str, Any]:
 
 
 def iri(kind: str, name: str) -> str:
-    """The identifier of a node or agent, the same in every part of a document."""
+    """The identifier of a node or agent, equal in every part of a document."""
     return f"{BASE}{kind}/{quote(name, safe='/:@._-~')}"
 
 

@@ -27,7 +27,7 @@ def write_crate(archive: Archive, traced: Lineage, folder: Path) -> int:
         )
     contents = _contents(archive, traced.graph)
     for name in contents:
-        if not is_below(name):  # readable manifests never name such a place
+        if not is_below(name):  # readable manifests never name such a path
             raise ArchiveUnusable(
                 f"lineage: {name!r} is a path outside the crate's folder, a path inside it is needed; do not use this archive"
             )
@@ -81,7 +81,7 @@ def _contents(archive: Archive, graph: Graph) -> dict[str, bytes]:
     traced = {name: (archive.root / name).read_bytes() for name in sorted(names) if (archive.root / name).is_file()}
     for node in graph.nodes.values():
         if node.kind in SETTINGS:
-            traced[_place(node)] = files.json_bytes(node.about)
+            traced[_crate_path(node)] = files.json_bytes(node.about)
     return traced
 
 
@@ -175,7 +175,7 @@ def _program(software: dict[str, Any]) -> str:
     return "#" + quote("-".join(f"{name}-{number}" for name, number in sorted(software.items())))
 
 
-def _place(node: Node) -> str:
+def _crate_path(node: Node) -> str:
     """Path of a node in the crate; empty for a node without a file there."""
     if node.kind in SETTINGS:
         return f"settings/{quote(node.id.replace(':', '-', 1), safe=' @')}.json"  # names of settings may have any character
@@ -183,4 +183,4 @@ def _place(node: Node) -> str:
 
 
 def _id(node: Node) -> str:
-    return quote(_place(node)) or f"#{quote(node.id)}"
+    return quote(_crate_path(node)) or f"#{quote(node.id)}"

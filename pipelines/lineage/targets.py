@@ -81,14 +81,14 @@ def _of_run(archive: Archive, run: Run) -> Lineage:
 
 
 def _of_file(archive: Archive, target: str) -> Lineage:
-    """A file by its place in the archive, else by its content."""
+    """A file by its path in the archive, else by its content."""
     gatherer = Gatherer(archive)
-    place = _below(archive, target)
-    for name in _runs_of(archive, place):
+    path = _below(archive, target)
+    for name in _runs_of(archive, path):
         run = archive.run(name)
         gatherer.run(run)
         gatherer.certificates_of(run)
-    focus = [node.id for node in gatherer.graph.nodes.values() if place in {node.file, node.about.get("manifest")}]
+    focus = [node.id for node in gatherer.graph.nodes.values() if path in {node.file, node.about.get("manifest")}]
     if not focus:
         digest = files.sha256(Path(target)) if Path(target).is_file() else files.sha256(archive.root / target)
         for name in archive.run_ids():
@@ -112,15 +112,15 @@ def _below(archive: Archive, target: str) -> str:
     return path.relative_to(root).as_posix() if path.is_relative_to(root) else ""
 
 
-def _runs_of(archive: Archive, place: str) -> list[str]:
+def _runs_of(archive: Archive, path: str) -> list[str]:
     """The runs of a file of the archive: its own run, or all runs of its capture."""
-    match place.split("/"):
+    match path.split("/"):
         case ["runs", run, _, *_]:
             return [run]
         case ["captures", capture, _, *_]:
             return _runs_where(archive, lambda about: about.get("capture") == capture)
         case ["calibrations", _, _, *_]:
-            return [str(files.read_json(archive.root / place).get("run"))]
+            return [str(files.read_json(archive.root / path).get("run"))]
         case _:
             return []
 

@@ -53,9 +53,9 @@ class _Drawer:
         if steps and all(step.id in self.shown for step in steps):
             branch.add(_thing(self.graph.nodes[name]).append(ABOVE, style="dim"))
             return
-        own = branch.add(_thing(self.graph.nodes[name]))
+        child = branch.add(_thing(self.graph.nodes[name]))
         for step in steps:
-            self._step(own, step)
+            self._step(child, step)
 
     def _step(self, branch: Tree, step: ProvActivity) -> None:
         """A step that was not shown before, with the nodes that it used."""
@@ -64,7 +64,7 @@ class _Drawer:
             self._used(branch.add(_step(step, self._versions(step))), step)
 
     def _versions(self, step: ProvActivity) -> str:
-        """Versions of program and libraries; empty where they are the same as those shown last."""
+        """Versions of program and libraries; empty where they are those shown last."""
         known = {**step.about.get("software", {}), **step.about.get("libraries", {})}
         text = " ".join(f"{name} {number}" for name, number in known.items())
         before, self.versions = self.versions, text or self.versions
@@ -73,7 +73,7 @@ class _Drawer:
     def _used(self, branch: Tree, step: ProvActivity) -> None:
         raw = [name for name in step.used if name.startswith("captures/")]
         for name in step.used:
-            shown = all(one.id in self.shown for one in self.made.get(name, []))
+            shown = all(maker.id in self.shown for maker in self.made.get(name, []))
             if name not in raw and not (shown and self.graph.nodes[name].kind == "run"):
                 self.up(branch, name)
         if raw:
@@ -86,9 +86,9 @@ class _Drawer:
         words = f"raw samples  {len(records)} records of capture {names[0].split('/')[1]}, {len(names)} files"
         known = bool(steps) and all(step.id in self.shown for step in steps)
         rest = ABOVE if known else f"  ({'/'.join(names[0].split('/')[2:])} {first.sha256[:SHORT]} …)"
-        own = branch.add(Text(words, style=STYLES["samples"]).append(rest, style="dim"))
+        child = branch.add(Text(words, style=STYLES["samples"]).append(rest, style="dim"))
         for step in steps:
-            self._step(own, step)
+            self._step(child, step)
 
 
 def _thing(node: Node) -> Text:

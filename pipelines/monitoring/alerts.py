@@ -58,7 +58,7 @@ class Poster:
     def __init__(self, address: str, folder: Path) -> None:
         if not address.startswith(("http://", "https://")):
             raise WrongUse(f"alerts: web hook '{address}', an address such as https://host/path is needed; correct it")
-        self._address, self._place = address, folder / ACCEPTED_FILE
+        self._address, self._path = address, folder / ACCEPTED_FILE
 
     def post(self, alerts: list[Alert]) -> tuple[int, str]:
         """Number of alerts accepted in this call, and the first error; the next call posts the remaining alerts."""
@@ -79,7 +79,7 @@ class Poster:
                 return count, fault
             accepted[alert["id"]] = time.time()
             newest = sorted(accepted.items(), key=lambda item: item[1])[-MOST_IDS:]
-            publish(self._place, json_bytes(dict(newest)))
+            publish(self._path, json_bytes(dict(newest)))
             count += 1
         return count, fault
 
@@ -91,7 +91,7 @@ class Poster:
 
     def _accepted(self) -> dict[str, float]:
         try:
-            content = json.loads(self._place.read_text(encoding="utf-8"))
+            content = json.loads(self._path.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return {}
         known = cast("dict[Any, Any]", content if isinstance(content, dict) else {})
@@ -130,7 +130,7 @@ def _of_discoveries(folder: Path, now: datetime) -> Iterator[Alert]:
 
 
 def _newest(folder: Path, kind: str, key: str, now: datetime) -> list[dict[str, Any]]:
-    """A list of the newest document of a kind; empty where there is none, or an old one."""
+    """A list of the newest document of a kind; empty where there is no document, or an old one."""
     newest = max(folder.glob(f"{kind}-*.json"), key=lambda path: path.name, default=None)
     if newest is None or now - datetime.fromtimestamp(newest.stat().st_mtime, UTC) > AUDIT_AGE:
         return []

@@ -22,7 +22,7 @@ IMPORTED = "(import)"  # station label of an imported run
 
 @dataclass(frozen=True)
 class RunTime:
-    """Of a finished run: time on the station's clock, s; pauses and their duration, s; repeated dwells; door openings."""
+    """Times of a finished run: on the station's clock, s; pauses and their duration, s; repeated dwells; door openings."""
 
     station_s: float = 0.0
     pauses: int = 0
@@ -32,7 +32,9 @@ class RunTime:
 
     def __add__(self, other: Self) -> Self:
         """The sum of two runs, field by field."""
-        return type(self)(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
+        return type(self)(
+            **{field.name: getattr(self, field.name) + getattr(other, field.name) for field in fields(self)}
+        )
 
 
 @dataclass
@@ -51,7 +53,7 @@ class LineNumbers:
 class ArchiveNumbers:
     """Numbers of an archive.
 
-    lag_s : time since the end of the oldest finished run that is not in the chain yet, s; 0 without one
+    lag_s : time since the end of the oldest finished run that is not in the chain yet, s; 0 where all are
     free_bytes : free space on its disk; None for an object store
     due : number of units whose certificate ends within a period, by the period in days
     """

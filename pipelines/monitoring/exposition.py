@@ -32,7 +32,7 @@ class _Collector:
         self._snapshot = snapshot
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
-        """All families."""
+        """The families of all numbers, in the form of Prometheus."""
         snapshot = self._snapshot
         yield _family("info", "Version of Tumbleline", ("version",), {(version("tumbleline"),): 1.0})
         yield _family("healthy", "1 where /healthz answers 200", (), {(): snapshot.ok})
@@ -80,7 +80,7 @@ def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFami
 def _queues(numbers: QueueNumbers, now: datetime) -> Iterator[GaugeMetricFamily]:
     queues = sorted(numbers.queues)
     opened, ended = (Counter((run.queue, run.state) for run in runs) for runs in (numbers.open, numbers.ended))
-    states = {(queue, one.lower()): opened[queue, one] for queue in queues for one in SHOWN_STATES}
+    states = {(queue, state.lower()): opened[queue, state] for queue in queues for state in SHOWN_STATES}
     yield _family("queue_runs", "Flow runs that are due, running or paused", ("queue", "state"), states)
     since: dict[str, datetime] = {}
     for run in numbers.late(now):
@@ -110,6 +110,6 @@ def _stations(numbers: StationNumbers) -> Iterator[GaugeMetricFamily]:
 def _family(name: str, text: str, labels: Sequence[str], values: Mapping[tuple[str, ...], float]) -> GaugeMetricFamily:
     """A family of numbers, each by the values of the labels."""
     family = GaugeMetricFamily(f"tumbleline_{name}", text, labels=labels)
-    for own, value in values.items():
-        family.add_metric(own, float(value))
+    for labelled, value in values.items():
+        family.add_metric(labelled, float(value))
     return family

@@ -72,8 +72,8 @@ def read_queues(now: datetime | None = None) -> QueueNumbers:
     since = {"after_": (at - RECENT).isoformat()}
     failed = {"state": {"type": {"any_": list(FAILED)}}, "end_time": since}
     cancelled = {"state": {"type": {"any_": ["CANCELLED"]}}, "end_time": since}
-    numbers = QueueNumbers(open=[_run(one) for one in _runs(due)])
-    ended = [_run(one) for one in (*_runs(failed), *_runs(cancelled))]
+    numbers = QueueNumbers(open=[_run(run) for run in _runs(due)])
+    ended = [_run(run) for run in (*_runs(failed), *_runs(cancelled))]
     numbers.ended = [run for run in ended if run.state in FAILED or run.message.startswith(MISSED)]
     for pool in _ask("work_pools/filter", {"limit": PAGE_SIZE}):
         name = urllib.parse.quote(str(pool["name"]), safe="")

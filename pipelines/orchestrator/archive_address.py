@@ -42,8 +42,8 @@ def archive_of(parameter: str | None) -> Archive:
         return Archive()
     if parameter.startswith(BLOCK):
         return Archive(_of_block(parameter.removeprefix(BLOCK)))
-    own = os.environ.get(VARIABLE, "")
-    return Archive(own if own and without_credentials(own) == parameter else parameter)
+    address = os.environ.get(VARIABLE, "")
+    return Archive(address if address and without_credentials(address) == parameter else parameter)
 
 
 @contextmanager
@@ -84,9 +84,9 @@ def without_credentials(address: str) -> str:
     if at and user not in HARMLESS:
         authority = host
     pairs = parse_qsl(query, keep_blank_values=True)
-    kept = [(name, value) for name, value in pairs if name in NO_SECRET or not SECRET.search(name)]
-    if len(kept) != len(pairs):
-        query = urlencode(kept, quote_via=quote, safe="/:,")
+    harmless = [(name, value) for name, value in pairs if name in NO_SECRET or not SECRET.search(name)]
+    if len(harmless) != len(pairs):
+        query = urlencode(harmless, quote_via=quote, safe="/:,")
         question = "?" if query else ""
     return f"{scheme}://{authority}{slash}{path}{question}{query}"
 

@@ -69,17 +69,17 @@ def restore_database(copy: Path, target: str) -> None:
         options = ["--clean", "--if-exists", "--no-owner", "--single-transaction", "--exit-on-error"]
         _run(["pg_restore", *options, *_address(target), str(copy)], target)
         return
-    place = Path(target)
+    path = Path(target)
     _refuse_unsound(copy)
-    _refuse_used(place)
-    place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    aside = place.with_name(f"{place.name}.restored")
+    _refuse_used(path)
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    aside = path.with_name(f"{path.name}.restored")
     aside.unlink(missing_ok=True)
     aside.touch(PRIVATE)
     _copy_sqlite(copy, aside)
     for suffix in ("-wal", "-shm"):
-        place.with_name(place.name + suffix).unlink(missing_ok=True)
-    aside.replace(place)
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
+    aside.replace(path)
 
 
 def _copy_sqlite(source: Path, target: Path) -> None:
@@ -99,18 +99,18 @@ def _copy_sqlite(source: Path, target: Path) -> None:
     _refuse_unsound(target)
 
 
-def _refuse_used(place: Path) -> None:
+def _refuse_used(path: Path) -> None:
     """Refuse a database in write-ahead mode that another process has open: each holds a shared lock on it all the time."""
-    if not place.is_file():
+    if not path.is_file():
         return
     try:
-        with closing(sqlite3.connect(place, timeout=1.0)) as database:
+        with closing(sqlite3.connect(path, timeout=1.0)) as database:
             database.execute("pragma locking_mode=exclusive")
             database.execute("begin exclusive")
             database.rollback()
     except sqlite3.OperationalError as problem:
         raise WrongUse(
-            f"restore: {place} is in use ({problem}), a stopped server is needed; stop it and its workers, then restore"
+            f"restore: {path} is in use ({problem}), a stopped server is needed; stop it and its workers, then restore"
         ) from None
     except sqlite3.DatabaseError:  # it is damaged, which is why it is replaced
         return

@@ -31,7 +31,7 @@ WORKING = (StateType.PENDING, StateType.RUNNING, StateType.CANCELLING)
 LOST_S = 60.0
 """Longest time from the moment at which a worker takes a run to the start of its process, s, with a large margin."""
 
-SUSPENDED = "Suspended"  # such a run has no process and gets a new one when it is resumed
+SUSPENDED = "Suspended"  # such a run has no process, and gets one when it is resumed
 WORKER = "prefect.worker.name"  # label that the worker of Prefect gives to the runs that it takes
 GONE = "its process has ended: it was killed, or its worker ended; give the same order again to continue"
 
@@ -78,7 +78,7 @@ def _without_process(client: SyncPrefectClient, pool: str, queue: str, worker: s
 class LostRuns:
     """Runs of a station's queue whose process ended while the server could not be told, while their worker goes on.
 
-    Such a run never begins or ends by itself, and the queue gives out no other one: a run that had not begun yet has no heartbeat
+    Such a run never begins or ends by itself, and the queue gives out no other run: a run that had not begun yet has no heartbeat
     that could stop. A worker that has just taken a run has no process for it either, so a run is closed when that was so for
     ``LOST_S`` in one state. The time is that of this computer since its start: whether its clock is right does not matter.
     """
@@ -127,9 +127,11 @@ def lives(run: FlowRun) -> bool:
     pid = run.infrastructure_pid
     if pid and not pid.isdecimal():
         return False
-    places = [PROCESSES / pid] if pid else [place for place in PROCESSES.glob("[0-9]*") if place.name.isdecimal()]
+    processes = (
+        [PROCESSES / pid] if pid else [process for process in PROCESSES.glob("[0-9]*") if process.name.isdecimal()]
+    )
     mark = f"PREFECT__FLOW_RUN_ID={run.id}".encode()
-    return any(mark in _environment(place).split(b"\0") for place in places if int(place.name) != os.getpid())
+    return any(mark in _environment(process).split(b"\0") for process in processes if int(process.name) != os.getpid())
 
 
 def _environment(process: Path) -> bytes:
@@ -187,7 +189,7 @@ def have_automation() -> None:
 
 
 def _keep(automation: AutomationCore) -> None:
-    """Make an automation, or update the existing one of the same name; further ones of the name are removed."""
+    """Make an automation, or update the existing automation of the name; further automations of the name are removed."""
     with get_client(sync_client=True) as client:
         same = [existing.id for existing in client.read_automations_by_name(automation.name)]
         if not same:

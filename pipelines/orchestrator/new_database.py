@@ -1,9 +1,9 @@
-"""A new database of the orchestrator as a copy of one that Prefect made once on this machine, in place of its migrations.
+"""A new database of the orchestrator as a copy of a database that Prefect made once on this machine, instead of its migrations.
 
 A new SQLite database goes through all migrations that Prefect has ever had, some hundred, which takes longer than all else that a
 first run does before it measures. The first server on a machine has Prefect make an empty database, which is stored in the
 user's cache folder; later ones copy it. It is named for the version of Prefect, for its migrations and for its own content:
-another Prefect has another one, and a damaged or changed file is made again.
+another Prefect has another file, and a damaged or changed file is made again.
 """
 
 import os
@@ -28,19 +28,19 @@ _OF_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 def make_database(home: Path) -> bool:
     """Make ``prefect.db`` in a folder; whether it was made.
 
-    Nothing is done where the database has an address of its own or where there is one already, and where nothing can be stored:
+    Nothing is done where the database has another address or exists already, and where nothing can be stored:
     Prefect makes it at its start, or says why it cannot.
     """
-    place = home / NAME
-    if os.environ.get(DATABASE) or place.exists():
+    path = home / NAME
+    if os.environ.get(DATABASE) or path.exists():
         return False
     try:
         content = _stored() or _made()
         with tempfile.NamedTemporaryFile(dir=home) as file:
             file.write(content)
             file.flush()
-            # complete or not at all, and never over one that another process has just made
-            place.hardlink_to(file.name)
+            # complete or not at all, and never over a file that another process has just made
+            path.hardlink_to(file.name)
     except (OSError, RuntimeError, sqlite3.Error, subprocess.SubprocessError):  # RuntimeError: the user has no home
         return False
     return True
@@ -89,7 +89,7 @@ def _made() -> bytes:
 
 
 def _migrate(made: Path) -> None:
-    """Have Prefect make a database in a folder of its own, without the settings and the folder of this process."""
+    """Have Prefect make a database in a temporary folder, without the settings and the folder of this process."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
     environment |= {"PREFECT_HOME": str(made.parent), "PREFECT_SERVER_ANALYTICS_ENABLED": "false", "DO_NOT_TRACK": "1"}
     command = [sys.executable, "-m", "prefect", "server", "database", "upgrade", "-y"]
@@ -104,4 +104,4 @@ def _migrate(made: Path) -> None:
     )
     with closing(sqlite3.connect(f"file:{made}?mode=rw", uri=True)) as database:  # no file: Prefect wrote elsewhere
         database.execute("pragma journal_mode=wal")
-        database.execute("pragma wal_checkpoint(truncate)")  # all of it is in the one file
+        database.execute("pragma wal_checkpoint(truncate)")  # all of it is in this file

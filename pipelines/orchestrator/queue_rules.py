@@ -3,7 +3,7 @@
 The queue of a station gives out one run at a time. The rest is the policy of the deployment
 (:mod:`pipelines.orchestrator.policy`). The first process of a worker applies it when it starts and every ``EVERY_S`` seconds,
 also while its worker is busy or dead. It also closes runs whose process ended while the server was away, which would keep their
-place in the queue for ever.
+position in the queue for ever.
 """
 
 import threading
@@ -110,7 +110,7 @@ def _cancel_missed(client: SyncPrefectClient, pool: str, queue: str, now: dateti
 
 def newer_run(deployment: str, start: datetime, now: datetime | None = None) -> str:
     """Name of a run of the deployment's schedule that was due after ``start`` and is not cancelled; empty where there is none."""
-    # as Any: Prefect names a type of its own for times, and takes those of Python
+    # as Any: Prefect names another type for times, and takes those of Python
     after, before = cast("Any", start + timedelta(milliseconds=1)), cast("Any", now or datetime.now(UTC))
     with get_client(sync_client=True) as client:
         runs = client.read_flow_runs(
@@ -151,14 +151,14 @@ def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: dat
     texts: list[str] = []
     crashed = runs_of_queue(client, pool, queue, (StateType.CRASHED,), FlowRunSort.EXPECTED_START_TIME_DESC)
     for run in crashed:
-        # one that lives still drives the station: the server missed its heartbeats
+        # a living run still drives the station: the server missed its heartbeats
         if policy_of_tags(run.tags).crashed != "continue" or lives(run):
             continue
         if run.state is None or not settled <= now - run.state.timestamp <= CONTINUED_WITHIN:
             continue
         # not run_count: a run whose process could not start has none
         crashes = sum(state.type == StateType.CRASHED for state in client.read_flow_run_states(run.id))
-        # one that has not crashed now was continued by another worker, which was faster
+        # a run that has not crashed now was continued by another worker, which was faster
         if crashes >= ATTEMPTS or client.read_flow_run(run.id).state_type != StateType.CRASHED:
             continue
         message = CONTINUED.format(attempt=crashes + 1, attempts=ATTEMPTS)

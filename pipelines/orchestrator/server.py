@@ -50,10 +50,10 @@ def serve(
     tls : files of the certificate and of its key, for https; clients name the authority in PREFECT_API_SSL_CERT_FILE
     """
     known, scheme = [*settings.LOOPBACK, *names], "http" if tls is None else "https"
-    own = settings.origins(known, port, scheme)
+    origins = settings.origins(known, port, scheme)
     os.umask(PRIVATE)
     key = settings.use_key(settings.SERVER_KEY)
-    os.environ.update(settings.closed(key, own))
+    os.environ.update(settings.closed(key, origins))
     settings.use_database()
     os.environ.setdefault("PREFECT_SERVER_UI_API_URL", f"{scheme}://{known[-1]}:{port}/api")
     if wants_json():
@@ -76,12 +76,12 @@ def serve(
 
         from pipelines.orchestrator.application import application  # Prefect reads its settings when it is imported
 
-        app = application(known, own, key)
+        app = application(known, origins, key)
     # another machine is a worker's: each process of its flows has connections
     limits = ConnectionLimits(of_one_address=MOST // 2, plain=tls is None)
-    place = bound_socket(host, port, "orchestrator", limits)
+    bound = bound_socket(host, port, "orchestrator", limits)
     config = uvicorn.Config(
-        TimedRequests(app, place.connections),
+        TimedRequests(app, bound.connections),
         host=host,
         port=port,
         log_config=None,  # in the format of Prefect's logging
@@ -94,8 +94,8 @@ def serve(
     server = uvicorn.Server(config)
     if home is not None:
         threading.Thread(target=_leave_when_alone, args=(home, server), daemon=True).start()
-    with place:
-        server.run(sockets=[place])
+    with bound:
+        server.run(sockets=[bound])
 
 
 def private_folder(path: Path) -> None:
@@ -128,7 +128,7 @@ def _left(home: Path) -> bool:
 
 
 def any_client(home: Path) -> bool:
-    """Whether a living process uses the server; files of dead ones are removed."""
+    """Whether a living process uses the server; files of dead processes are removed."""
     alive = False
     for path in (home / CLIENTS).glob("*"):
         with path.open("a") as file:

@@ -1,4 +1,4 @@
-"""Settings of the orchestrator before its import: place of its history, its key, and no network access to third parties.
+"""Settings of the orchestrator before its import: address of its history, its key, and no network access to third parties.
 
 :func:`check_server` finds out before Prefect, whose errors are tracebacks, whether a server answers and accepts the key.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 
 from schemas.errors import LinkLost, WrongUse
 
-LOCAL = "local"  # in place of the address of a Dask scheduler: a cluster of processes on this computer
+LOCAL = "local"  # instead of the address of a Dask scheduler: a cluster of processes on this computer
 STARTUP_S = 120
 SERVER_KEY, CLIENT_KEY = "PREFECT_SERVER_API_AUTH_STRING", "PREFECT_API_AUTH_STRING"
 CREDENTIAL = "prefect-auth"  # name in the systemd units (LoadCredential)
@@ -114,7 +114,7 @@ def use_key(variable: str) -> str:
 
 
 def use_database() -> None:
-    """Put the address of the orchestrator's database into the environment of this process, where a private file has one.
+    """Put the address of the orchestrator's database into the environment of this process, where a private file states it.
 
     Sources in this order: the environment, the file of TUMBLELINE_ORCHESTRATOR_DATABASE, and the credential
     ``prefect-database`` of a systemd unit. Without one the database is SQLite in PREFECT_HOME.
@@ -181,7 +181,7 @@ def check_server(patience_s: float = 0.0) -> None:
 
 
 def with_key(request: urllib.request.Request) -> urllib.request.Request:
-    """The request with the key of this process, where it has one."""
+    """The request, with the key of this process if there is a key."""
     key = os.environ.get(CLIENT_KEY)
     if key:
         request.add_header("Authorization", "Basic " + base64.b64encode(key.encode()).decode())

@@ -135,9 +135,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     begin = commands.add_parser("start", help="Work for a station until stopped.")
     end = commands.add_parser("stop", help="Wait for the end of the station's run and start no other.")
-    for one in (begin, end):
-        one.add_argument("--pool", default="line", help="Work pool of the line.")
-        one.add_argument("--station", required=True, help="Name of the station and of its work queue.")
+    for command in (begin, end):
+        command.add_argument("--pool", default="line", help="Work pool of the line.")
+        command.add_argument("--station", required=True, help="Name of the station and of its work queue.")
     begin.add_argument(
         "--queue", action="append", default=[], help="A further queue of the same pool; may be repeated."
     )

@@ -1,4 +1,4 @@
-"""The first process of a worker ends a worker that hangs: one that reports no more to a server that answers.
+"""The first process of a worker ends a worker that hangs: it reports no more to a server that answers.
 
 After a server outage of a minute Prefect's worker may give up its loops and wait for ever in its own clean-up: the process lives,
 takes no run, and no service manager sees it. What counts is the worker's heartbeat as the server has it. Times are those of the
@@ -40,7 +40,7 @@ class Silence:
         self._since = float("nan")
 
     def heard(self, heartbeat: str, now: float) -> bool:
-        """Note the time of the last heartbeat that the server has (empty without one); whether the worker is silent."""
+        """Note the time of the last heartbeat that the server has (empty without a heartbeat); whether the worker is silent."""
         new, gap = heartbeat != self._last, not now - self._asked <= self.gap_s
         if self._last is not None and new:
             self._begun = True
@@ -67,7 +67,7 @@ def watched(
 ) -> Generator[None]:
     """A context in which a child that is silent is killed, by a thread of this process; its own children go on.
 
-    ask : time of the child's last heartbeat, empty without one; raises where the server does not answer.
+    ask : time of the child's last heartbeat, empty without a heartbeat; raises where the server does not answer.
     child : the process; None before it has started.
     every_s : period of the heartbeats.
     """
@@ -112,9 +112,9 @@ def in_thread(name: str, repeat: Callable[[threading.Event], None], patience_s: 
 
 
 def heartbeat_of(pool: str, name: str) -> str:
-    """Time of the last heartbeat of a worker as the server has it; empty without one."""
+    """Time of the last heartbeat of a worker as the server has it; empty where it sent none."""
     from prefect.client.orchestration import get_client
 
     with get_client(sync_client=True) as client:
-        workers = [one for one in client.read_workers_for_work_pool(pool) if one.name == name]
+        workers = [worker for worker in client.read_workers_for_work_pool(pool) if worker.name == name]
     return workers[0].last_heartbeat_time.isoformat() if workers and workers[0].last_heartbeat_time else ""

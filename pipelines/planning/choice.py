@@ -26,7 +26,7 @@ MILLI = 1e3
 
 @dataclass(frozen=True)
 class Need:
-    """What an application asks for: range, g; temperatures, °C; error (k = 2), µg; bandwidth, Hz."""
+    """The requirement of an application: range, g; temperatures, °C; error (k = 2), µg; bandwidth, Hz."""
 
     range_g: float
     low_C: float
@@ -43,8 +43,8 @@ class Need:
 
 def _root(values: float | tuple[float, float, float]) -> float:
     """The root mean square of a figure of one axis or three."""
-    own = values if isinstance(values, tuple) else (values,)
-    return math.sqrt(sum(v * v for v in own) / len(own))
+    by_axis = values if isinstance(values, tuple) else (values,)
+    return math.sqrt(sum(v * v for v in by_axis) / len(by_axis))
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ TERMS = (
 
 
 def need_of(range_text: str, temperature: str, error: str, bandwidth_hz: float) -> Need:
-    """What is asked for, from texts such as ``4g``, ``-40..85`` and ``2mg``.
+    """The requirement from texts such as ``4g``, ``-40..85`` and ``2mg``.
 
     Raises WrongUse: a text is of another form, or a value is not positive.
     """
@@ -132,7 +132,7 @@ def choice(need: Need, devices: list[str]) -> ChoiceDocument:
     """
     known = preset_names()
     for name in devices:
-        if name.lower() not in {one.lower() for one in known}:
+        if name.lower() not in {preset.lower() for preset in known}:
             raise WrongUse(f"--device: no preset '{name}'; {did_you_mean(name, known)}")
     rows = [_row(load_preset(name), need, calibration) for name in devices or known for calibration in CALIBRATIONS]
     order = list(CALIBRATIONS)
@@ -181,7 +181,7 @@ def _share(term: Term, level: int) -> float:
 
 
 def _cannot(preset: Preset, need: Need) -> list[str]:
-    """What no calibration mends."""
+    """Properties of a preset that rule it out and that no calibration improves."""
     low, high = preset.temperature_low_C, preset.temperature_high_C
     beyond = {
         f"saturates at {preset.range_g:g} g": need.range_g > preset.range_g,

@@ -34,7 +34,7 @@ class PlanContext:
     activities : what the station does and when
     state : the planned dwells of the fit, (n,)
     covariance : (n, n), of the dwell means, g²
-    prior : (axes, p, p), precision of a prior of the model's coefficients, 1/g²; None without one
+    prior : (axes, p, p), precision of a prior of the model's coefficients, 1/g²; None without a prior
     """
 
     recipe: Recipe
@@ -48,8 +48,8 @@ class PlanContext:
     @property
     def minutes(self) -> float:
         """Station time without the static record, min."""
-        own = spent(self.activities)
-        return own.total - own.static_record
+        times = spent(self.activities)
+        return times.total - times.static_record
 
     @property
     def heat(self) -> NDArray[np.float64]:
@@ -75,10 +75,10 @@ def plan_context(
             "recipe are made; list it, or see station time and figures of the procedures with 'tumbleline plan'",
             key="procedures",
         )
-    whole = schedule(steps(recipe), station, recipe)
-    state = state_of(whole, station, recipe, history=True)
+    activities = schedule(steps(recipe), station, recipe)
+    state = state_of(activities, station, recipe, history=True)
     covariance = dwell_covariance(state.time, recipe.dwell_s, noise, slowest=slowest)
-    return PlanContext(recipe, station, noise, whole, state, covariance, prior)
+    return PlanContext(recipe, station, noise, activities, state, covariance, prior)
 
 
 def shown_by_verification(
@@ -108,7 +108,7 @@ def with_verification_hint(text: str, activities: Sequence[Activity], station: S
 
 
 def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
-    """Noise of a preset, with given values in place of the preset's.
+    """Noise of a preset, with given values instead of the preset's.
 
     device : preset; the recipe's device where it is empty
     density : white noise, µg/√Hz · wander : flicker floor of the Allan deviation, µg
@@ -141,7 +141,7 @@ def procedure_rows(recipe: Recipe, station: StationConfig, limits: Limits | None
     rows: list[dict[str, Any]] = []
     for number, part in enumerate(parts_of(recipe)):
         procedure = PROCEDURES[part.kind]
-        own = [activity for activity in activities if activity.step.procedure == number]
+        of_procedure = [activity for activity in activities if activity.step.procedure == number]
         figures = [
             {
                 "figure": s.name,
@@ -154,9 +154,9 @@ def procedure_rows(recipe: Recipe, station: StationConfig, limits: Limits | None
         row = {
             "procedure": part.kind,
             "states": procedure.states,
-            "records": len({activity.step.record for activity in own}),
-            "minutes": round(spent(own).total, 2),
-            "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in own)),
+            "records": len({activity.step.record for activity in of_procedure}),
+            "minutes": round(spent(of_procedure).total, 2),
+            "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in of_procedure)),
             "equipment": list(procedure.roles_for(part)),
             "figures": figures,
         }

@@ -49,7 +49,8 @@ def discrimination_requirement(
     places = [tuple(k for k, name in enumerate(names) if name == rival) for rival in rivals]
     largest = np.max(np.abs(columns), axis=1)
     sizes = [
-        size_ug / MICRO / np.where(largest > 0.0, largest, 1.0)[:, list(own)] / scale[:, list(own)] for own in places
+        size_ug / MICRO / np.where(largest > 0.0, largest, 1.0)[:, list(indices)] / scale[:, list(indices)]
+        for indices in places
     ]
     base = tuple(k for k, name in enumerate(names) if name not in rivals)
     units = max(1, len(against.recipe.units))

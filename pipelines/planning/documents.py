@@ -82,7 +82,7 @@ class PlannedBias(TypedDict):
 
 
 class ReachableQuantity(TypedDict):
-    """What can be reached of one quantity."""
+    """The uncertainty that a recipe can reach of one quantity."""
 
     quantity: Annotated[
         str,
@@ -207,7 +207,7 @@ class LineLot(TypedDict):
 
 
 class LineResource(TypedDict):
-    """What the lots of a line need of a shared resource, of the fixtures or of the operators."""
+    """The use of a shared resource, of the fixtures or of the operators by the lots of a line."""
 
     resource: str
     count: int
@@ -216,7 +216,7 @@ class LineResource(TypedDict):
 
 
 class LineRate(TypedDict):
-    """How long a schedule is."""
+    """The duration and throughput of a schedule."""
 
     makespan_min: Annotated[float, "from the start until the last lot is unloaded"]
     minutes_per_lot: float

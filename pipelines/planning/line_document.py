@@ -19,7 +19,7 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
     recipe_named : the recipe of a name in the line's file
     """
     recipes = [(recipe_named(lot.recipe), lot.count) for lot in line.lots]
-    phases = [own for recipe, number in recipes for own in [phases_of(recipe, station)] * number]
+    phases = [lot_phases for recipe, number in recipes for lot_phases in [phases_of(recipe, station)] * number]
     counters = {recipe.name: count(1) for recipe, _ in recipes}
     names = [recipe.name for recipe, number in recipes for _ in range(number)]
     used, best, alone, bound = _best(line, phases)
@@ -28,8 +28,8 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
     labels = [f"{name}-{next(counters[name])}" for name in names]
     activities = [
         activity
-        for label, fixture, placed, own in zip(labels, fixtures, best.lots, phases, strict=True)
-        for activity in _activities(used, label, fixture, placed, own)
+        for label, fixture, placed, lot_phases in zip(labels, fixtures, best.lots, phases, strict=True)
+        for activity in _activities(used, label, fixture, placed, lot_phases)
     ]
     resources = _resources(used, phases)
     return {
@@ -76,14 +76,14 @@ def _best(line: Line, phases: Sequence[Sequence[Phase]]) -> tuple[Line, Shortest
 
 
 def free_places(spans: Sequence[tuple[int, int]]) -> list[int]:
-    """For each (begin, end) the lowest place, from 0, that is free at its begin."""
+    """Index, from 0, of the first fixture that is free at the begin of each (begin, end)."""
     until: list[int] = []
     places = [0] * len(spans)
     for number in sorted(range(len(spans)), key=lambda k: spans[k]):
         begin, end = spans[number]
-        place = next((k for k, taken in enumerate(until) if taken <= begin), len(until))
-        until[place : place + 1] = [end]
-        places[number] = place
+        free = next((k for k, taken in enumerate(until) if taken <= begin), len(until))
+        until[free : free + 1] = [end]
+        places[number] = free
     return places
 
 
@@ -94,7 +94,7 @@ def _rate(found: Shortest) -> LineRate:
 
 
 def _activities(line: Line, lot: str, fixture: str, placed: Placed, phases: Sequence[Phase]) -> list[LineActivity]:
-    """What happens to a lot, in order."""
+    """The activities of a lot, in order of time."""
 
     def activity(
         kind: str, begin: int, steps: int, resources: Sequence[str], temperature: float | None
@@ -125,7 +125,7 @@ def _lot(lot: str, recipe: str, fixture: str, activities: Sequence[LineActivity]
 
 
 def _resources(line: Line, lots: Sequence[Sequence[Phase]]) -> list[LineResource]:
-    """What the lots need of everything that there is a number of: the most for each of it first.
+    """The use of every counted resource by the lots, the highest use of a single item first.
 
     Of operators it is counted against the part of the day that has a shift.
     """

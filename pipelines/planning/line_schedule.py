@@ -37,13 +37,13 @@ class NoSchedule(RecipeInvalid):
 
 @dataclass(frozen=True)
 class Stay:
-    """Names of the shared resources that a phase holds, of those among them that it keeps from the phase before, and of the new.
+    """Names of the shared resources that a phase holds, of those held since the phase before, and of the new.
 
     change : steps of the change before it; by_hand : whether that takes an operator
     """
 
     resources: tuple[str, ...]
-    kept: tuple[str, ...]
+    held: tuple[str, ...]
     changed: tuple[str, ...]
     change: int
     by_hand: bool
@@ -60,7 +60,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Shortest:
-    """The lots in the order given, the steps until the last one is unloaded, and the bound below which no schedule is."""
+    """The lots in the order given, the steps until the last lot is unloaded, and the bound below which no schedule is."""
 
     lots: list[Placed]
     makespan: int
@@ -74,7 +74,7 @@ def step_count(seconds: float) -> int:
 
 
 def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
-    """What each phase of a lot holds."""
+    """The shared resources that each phase of a lot holds, and the changes before it."""
     needed = [
         [resource for resource in line.shared if phase.needs.intersection(resource.needed_for)] for phase in phases
     ]
@@ -83,14 +83,14 @@ def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
     users = [k for k, of_phase in enumerate(places) if of_phase]
     made: list[Stay] = []
     for k, resources in enumerate(needed):
-        kept = [resource for resource in resources if k and resource in needed[k - 1]]
-        new = [resource for resource in resources if resource not in kept]
+        held = [resource for resource in resources if k and resource in needed[k - 1]]
+        new = [resource for resource in resources if resource not in held]
         if len(line.fixtures) == 1:  # it stays where it is, and each lot ends on what the next begins on
             there = places[users[users.index(k) - 1]] if k in users else []
             new = [resource for resource in places[k] if resource not in there]
         change = max((step_count(60.0 * resource.change_min) for resource in new), default=0)
         by_hand = any(resource.by_hand and resource.change_min for resource in new)
-        made.append(Stay(_names(resources), _names(kept), _names(new), change, by_hand))
+        made.append(Stay(_names(resources), _names(held), _names(new), change, by_hand))
     return made
 
 
@@ -113,7 +113,7 @@ def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:
     cp = library("ortools.sat.python.cp_model", "schedule", f"line {line.name}: the shortest schedule")
     model = _Model(cp, line, lots)
     solver = cp.CpSolver()
-    # one thread, and work counted in place of seconds: the same schedule on every machine
+    # one thread, and work counted instead of seconds: the schedule does not depend on the machine
     solver.parameters.num_workers, solver.parameters.linearization_level, solver.parameters.random_seed = 1, 2, 1
     solver.parameters.max_deterministic_time = WORK
     model.cp.minimize(model.makespan)
@@ -167,7 +167,7 @@ class _Model:
         self._in_order(lots)
 
     def _one_by_one(self, lots: Sequence[Sequence[Phase]]) -> int:
-        """Steps in which the lots are done one after the other, with every change."""
+        """Steps in which the lots are done in sequence, with every change."""
         return sum(
             self.load
             + self.unload
@@ -201,16 +201,16 @@ class _Model:
         """Begin of loading, of each phase and of unloading of a lot."""
         load = self._time(self.load)
         self.hands.append(self.cp.new_fixed_size_interval_var(load, self.load, ""))
-        end = free = load + self.load  # end of the phase before; of the last one in which the lot cannot be moved
+        end = free = load + self.load  # end of the phase before; of the last phase in which the lot cannot be moved
         begins: list[Any] = []
         for phase, stay in zip(phases, stays(self.line, phases), strict=True):
             length, begin = step_count(phase.seconds), self._time()
             self.cp.add(begin >= end)
-            if phase.kind == "return" or (stay.kept and not stay.changed):
+            if phase.kind == "return" or (stay.held and not stay.changed):
                 self.cp.add(begin == end)
             elif begins:
                 self.cp.add(begin <= end + self.wait + stay.change)
-                for name in stay.kept:
+                for name in stay.held:
                     between = self._time()
                     self.cp.add(between == begin - end)
                     self.held[name].append(self.cp.new_interval_var(end, between, begin, ""))

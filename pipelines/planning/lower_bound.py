@@ -26,7 +26,7 @@ PIECE_S = 120.0  # length of the dwells that fill the time between soaks, s
 RAMP_PIECE_S = 30.0  # likewise along a ramp, in which the temperature changes
 FIRST_LEGS = (0.5, 0.75, 1.0, 1.25)  # times of the first ramp, which begins in the room, over those of the others
 LOWEST, STEP = 0.05, 0.01  # smallest share of the textbook plan's station time to try, and the step
-LIKELY = 20  # number of orders of soaks whose division of time is optimised, the best ones under equal division
+LIKELY = 20  # number of orders of soaks whose division of time is optimised, the best orders under equal division
 
 
 @dataclass(frozen=True)

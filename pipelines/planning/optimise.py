@@ -87,7 +87,7 @@ def optimise(
 
     tolerance : ratio to the requirement up to which the nearest recipe is returned where none meets it, provided that it is
         quicker than the textbook plan
-    ramp : whether the devices are measured while the chamber ramps, in place of soaks
+    ramp : whether the devices are measured while the chamber ramps, instead of in soaks
     Raises RecipeInvalid: no recipe that was tried meets the requirement; the message gives the smallest ratio reached.
     """
     search = RecipeSearch(recipe, against, requirement, ramp=ramp)
@@ -144,7 +144,7 @@ class RecipeSearch:
         """Designs with the fewest dwells in the best orders of soaks, and their station times in s, the quickest first."""
         soak_orders = orders(self.requirement, self.against.station, self.recipe.soak_min_s, ramp=self.ramp)
         dwell_s = self.timed.dwell_lengths()[0]
-        # ramps are few, and one that does not get far enough says nothing of a longer one
+        # ramps are few, and a ramp that does not get far enough says nothing of a longer ramp
         likely = [(0.0, order) for order in soak_orders]
         if not self.ramp:
             likely = sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
@@ -153,7 +153,7 @@ class RecipeSearch:
             if math.isfinite(seconds):
                 tried += [self.with_fewest_dwells(order, length) for length in self.timed.dwell_lengths()]
         chosen: list[tuple[PlanDesign, float]] = []
-        for seconds, plan in sorted(tried, key=lambda one: one[0]):
+        for seconds, plan in sorted(tried, key=lambda trial: trial[0]):
             used = {other.order for other, _ in chosen}
             # the starting arrangement says little of a ramp: other lengths of its dwells are tried beside it
             again = not self.ramp and bool({plan.order, mirrored(plan.order)} & used)
@@ -193,7 +193,7 @@ class RecipeSearch:
         return (math.inf, plan) if fewest is None else (self.timed.ratio_and_seconds(fewest)[1], fewest)
 
     def best(self, plan: PlanDesign, best: PlanContext | None) -> PlanContext | None:
-        """The quicker of the best recipe so far and the one found by exchanges in the soaks of a design."""
+        """The quicker of the best recipe so far and that found by exchanges in the soaks of a design."""
         now: PlanDesign | None = plan
         for _ in range(ROUNDS):
             if now is None or sum(now.counts) > MOST or self.slower(now, best):
@@ -250,17 +250,17 @@ class RecipeSearch:
         The ramp that gets nearest to an end goes on through its own poses, in their order, until the device is there.
         """
         low, high = min(self.requirement.levels), max(self.requirement.levels)
-        own = [part.poses or [] for part in context.recipe.soaks]
+        poses = [part.poses or [] for part in context.recipe.soaks]
         for added in range(MOST):
             heat = context.heat
             if not short_of(heat, self.requirement.levels):
                 break
             end = low if heat.min() - low >= high - heat.max() else high
             step = [activity.step for activity in context.activities if activity.kind == "dwell"]
-            towards = [k for k, one in enumerate(step) if one.temperature == end]
+            towards = [k for k, planned in enumerate(step) if planned.temperature == end]
             leg = step[min(towards, key=lambda k: abs(heat[k] - end))].soak
             soaks = list(context.recipe.soaks)
-            more = own[leg][1 + added % (len(own[leg]) - 1)]  # a ramp begins and ends with the same pose
+            more = poses[leg][1 + added % (len(poses[leg]) - 1)]  # a ramp begins and ends with the same pose
             soaks[leg] = soaks[leg].model_copy(update={"poses": [*(soaks[leg].poses or []), more]})
             context = self.on_station(context.recipe.model_copy(update={"soaks": soaks}))
         return context

@@ -1,4 +1,4 @@
-"""The document of a recipe search: the recipe found beside the one that the search started from and the textbook plan."""
+"""The document of a recipe search: the recipe found beside that from which the search started and the textbook plan."""
 
 from collections import Counter
 from typing import Any
@@ -24,9 +24,9 @@ def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
     document, by_errors = plan(best.planned), best.requirement.discrimination is None
     lower = lower_bound(base, best.against, best.requirement, ramp=True) if best.ramp and by_errors else None
     slowest = float(best.against.state.time[-1])  # the flicker model of the new recipe
-    own = plan_context(base, best.against.station, best.against.noise, slowest=slowest, prior=best.requirement.prior)
+    start = plan_context(base, best.against.station, best.against.noise, slowest=slowest, prior=best.requirement.prior)
     try:
-        own_errors = identified(own).errors
+        own_errors = identified(start).errors
     except NotIdentified:
         own_errors = None
     textbook, recipe = best.against, best.planned.recipe
@@ -45,7 +45,7 @@ def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
         "poses": document["poses"],
         "dwells": document["dwells"],
         "minutes": document["minutes"],
-        "own_minutes": spent(own.activities).document(),
+        "own_minutes": spent(start.activities).document(),
         # largest ratio of the own recipe's errors to the required ones; None for rivals, or where it cannot identify its model
         "own_worst": float((own_errors / best.requirement.errors).max())
         if by_errors and own_errors is not None

@@ -79,9 +79,9 @@ def _of_record(context: PlanContext, verification: Array | None = None) -> Array
     fit, length = context.state.time, context.recipe.dwell_s
     time = fit if verification is None else np.concatenate([fit, verification])
     since = float(time.min()) - 0.5 * length
-    along, own = walk_mean(time, since, float(fit.min()), float(np.ptp(fit)))
+    along, variance = walk_mean(time, since, float(fit.min()), float(np.ptp(fit)))
     covariance = dwell_covariance(time, length, context.noise, since=since)
-    return covariance + context.noise.walk**2 * (own - along[:, None] - along)
+    return covariance + context.noise.walk**2 * (variance - along[:, None] - along)
 
 
 def _against_means(context: PlanContext, square: Array, gain: Array) -> tuple[Array, Array]:
@@ -106,7 +106,7 @@ def _against_means(context: PlanContext, square: Array, gain: Array) -> tuple[Ar
 def _bias(
     context: PlanContext, expected: Expected, of_record: Array, terms: BudgetTerms | None
 ) -> dict[str, float | str | None] | None:
-    """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None for a model without one.
+    """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None without a bias.
 
     See :func:`pipelines.stages.uncertainty.bias_measurands.bias_measurands`.
     """
@@ -152,7 +152,7 @@ def missing(state: State, effects: Sequence[str]) -> str:
         visibility = visibilities(state, rest, 1.0, [effect])
         if visibility and visibility[0].remaining_fraction <= SEEN:
             reasons[effect] = reason(state, effect, rest)
-    # of mutually confounded effects only the last one is reported: without it the others are identified
+    # of mutually confounded effects only the last is reported: without it the others are identified
     mutual = len(reasons) > 1 and any(visibilities(state, ("bias",), 1.0, [e])[0].seen for e in reasons)
     chosen = list(reasons)[-1:] if mutual else list(reasons)
     return "; ".join(f"{effect} cannot be identified: {reasons[effect]}" for effect in chosen)
@@ -162,22 +162,28 @@ def _coefficient_rows(expected: Expected) -> list[dict[str, Any]]:
     """One row per coefficient and axis; parameters of the station have axis ``*``."""
     rows: list[dict[str, Any]] = []
     for letter, names, errors in zip(AXES, expected.names, expected.errors.tolist(), strict=False):
-        place = Counter[str]()
+        count = Counter[str]()
         for (effect, name), error in zip(names, errors, strict=True):
-            rows.append(_coefficient(effect, name, letter, error, place[effect]))
-            place[effect] += 1
+            rows.append(_coefficient(effect, name, letter, error, count[effect]))
+            count[effect] += 1
     shared = zip(expected.shared_names, expected.shared_errors.tolist(), strict=True)
     return [*rows, *(_coefficient(effect, name, "*", error, 0) for (effect, name), error in shared)]
 
 
-def _coefficient(effect: str, name: str, axis: str, error: float, place: int) -> dict[str, Any]:
-    return {"effect": effect, "name": name, "axis": axis, "uncertainty_ug": MICRO * error, "unit": _unit(effect, place)}
+def _coefficient(effect: str, name: str, axis: str, error: float, number: int) -> dict[str, Any]:
+    return {
+        "effect": effect,
+        "name": name,
+        "axis": axis,
+        "uncertainty_ug": MICRO * error,
+        "unit": _unit(effect, number),
+    }
 
 
-def _unit(effect: str, place: int) -> str:
+def _unit(effect: str, number: int) -> str:
     """Unit of an effect's coefficient."""
     known = catalogue.get(effect)
-    return unit_texts(known, "µg")[place] if isinstance(known, SensorEffect) else "µrad"
+    return unit_texts(known, "µg")[number] if isinstance(known, SensorEffect) else "µrad"
 
 
 def _why(visibility: Visibility, context: PlanContext, checked: Collection[str]) -> str:
@@ -213,7 +219,7 @@ def _row(visibility: Visibility, context: PlanContext, checked: Collection[str])
 
 
 def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: Limits | None) -> dict[str, Any] | None:
-    """What a recipe can reach on its station; None where no uncertainty is stated.
+    """The uncertainties that a recipe can reach on its station; None where no uncertainty is stated.
 
     covariance : (n, n), of the dwells of the fit as the fit sees them, g²
     """
@@ -237,14 +243,14 @@ def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: L
         "not_stated": terms.stated.not_stated,
         "quantities": [
             {
-                "quantity": one.quantity,
-                "axis": one.axis,
-                "unit": one.unit,
-                "u": one.u,
-                "expanded": 2.0 * one.u,
-                "shares": {LABELS[name]: share for name, share in one.shares.items() if share >= 5e-4},
+                "quantity": quantity.quantity,
+                "axis": quantity.axis,
+                "unit": quantity.unit,
+                "u": quantity.u,
+                "expanded": 2.0 * quantity.u,
+                "shares": {LABELS[name]: share for name, share in quantity.shares.items() if share >= 5e-4},
             }
-            for one in reaches
+            for quantity in reaches
         ],
         "unreachable": [] if limits is None else unreachable(reaches, limits, months),
         "at_risk": [] if limits is None else at_risk(reaches, limits),
@@ -253,7 +259,7 @@ def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: L
 
 
 def remarks(context: PlanContext, terms: BudgetTerms) -> list[str]:
-    """What a reader should know of the statement: soaks that are too short, temperatures of the chamber, gravity by formula."""
+    """Remarks on the statement of uncertainty: soaks that are too short, temperatures of the chamber, gravity by formula."""
     stated, out = terms.stated, list[str]()
     if stated is None:
         return out

@@ -61,7 +61,7 @@ QUARTERS = 4
 
 @dataclass(frozen=True)
 class Requirement:
-    """What a recipe must achieve, and what it may consist of.
+    """The errors that a recipe must reach, and the poses, temperatures and orders that it may consist of.
 
     errors : (axes, p), g per unit of the column, largest standard error of each coefficient; with ``discrimination`` the scale of
         each column
@@ -72,7 +72,7 @@ class Requirement:
     criterion : see :mod:`inertial.planning.pose_exchange`
     verification : repetitions of each verification pose in the whole run, distributed over the soaks
     effects : ids of the effects to which the columns of ``errors`` belong; the recipe's model where empty
-    discrimination : rivals to discriminate between, in place of required errors
+    discrimination : rivals to discriminate between, instead of required errors
     prior : (axes, p, p), precision of a prior of the coefficients, 1/g²; discrimination does not use it
     """
 
@@ -88,7 +88,7 @@ class Requirement:
     prior: Array | None = None
 
     def ratio_to_required(self, matrix: Array, columns: Index | None = None) -> Array:
-        """Errors over the required ones, (..., axes, p), or per pair, of normal matrices (..., axes, p, p); met at ≤ 1.
+        """Expected over required errors, (..., axes, p), or per pair, of normal matrices (..., axes, p, p); met at ≤ 1.
 
         columns : of the coefficients in the matrices, the others being known; all where None
         """
@@ -98,7 +98,7 @@ class Requirement:
 
     @cached_property
     def _known(self) -> Array:
-        """Precision (axes, p, p) of the prior in units of the required errors; zero without one."""
+        """Precision (axes, p, p) of the prior in units of the required errors; zero without a prior."""
         axes, p = self.errors.shape
         return (
             np.zeros((axes, p, p))
@@ -130,14 +130,14 @@ def candidates(station: StationConfig, plan: str = "", count: int = CANDIDATES) 
 
 
 def temperature_choices(levels: Sequence[float]) -> tuple[float, ...]:
-    """Temperatures in °C that a recipe may include: the given ones, quarters of their range, and the reference inside it."""
+    """Temperatures, °C, that a recipe may include: those given, quarters of their range, and the reference inside it."""
     low, high = min(levels), max(levels)
     quarters = np.round(np.linspace(low, high, QUARTERS + 1), 1).tolist()
     return tuple(sorted({*levels, *quarters, *([T_REFERENCE] if low < T_REFERENCE < high else [])}))
 
 
 FEWEST, MOST = 3, 6
-MANY = 250  # number of orders of each length to consider, the quickest ones
+MANY = 250  # number of orders of each length to consider, the quickest
 RAMPS = (2, 3, 4, 5)  # numbers of ramps in turn that are tried
 PRODUCTS = 20000  # maximum number of arrangements of a given number of soaks to enumerate
 
@@ -161,12 +161,12 @@ def orders(
     for count in range(FEWEST if back else 1, MOST + 1):
         if len(free) ** count > PRODUCTS:
             break
-        own = [
+        of_length = [
             o
             for o in product(free, repeat=count)
             if set(levels) <= set(o) and all(a != b for a, b in pairwise(o)) and (not back or _returns(o))
         ]
-        candidates += sorted(own, key=lambda order: soak_seconds(order, station, shortest_s))[:MANY]
+        candidates += sorted(of_length, key=lambda order: soak_seconds(order, station, shortest_s))[:MANY]
     return sorted(candidates, key=lambda order: soak_seconds(order, station, shortest_s))
 
 
@@ -192,6 +192,6 @@ def _returns(order: Sequence[float]) -> bool:
 
 
 def soak_seconds(order: Sequence[float], station: StationConfig, shortest_s: float) -> float:
-    """Station time of the soaks alone, s, from room temperature; each starts from the settled temperature of the one before."""
+    """Station time of the soaks alone, s, from room temperature; each starts from the settled temperature of the soak before."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
     return sum(soaked(StationPose(air=a, device=a), b, station, shortest_s)[0] for a, b in pairwise((room, *order)))

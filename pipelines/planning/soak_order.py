@@ -114,7 +114,7 @@ def look_counts(activities: Sequence[Activity], station: StationConfig, recipe: 
 
 
 def _leverage(columns: Array) -> float:
-    """Largest part of a dwell's error that its own fit takes up, of columns (axes, n, p); one where they are not determined."""
+    """Largest part of a dwell's error that its own fit absorbs, of columns (axes, n, p); 1 where they are not determined."""
     size = np.linalg.norm(columns, axis=-2, keepdims=True)
     left, value, _ = np.linalg.svd(columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
     if np.any(value[:, -1] <= SINGULAR * value[:, 0]):
@@ -137,7 +137,7 @@ def known_after(context: PlanContext, required: Array) -> float | None:
 
 
 def _ratio(context: PlanContext, count: int, required: Array, looks: int) -> float:
-    """Largest expected error over the required one with the first dwells, with the allowance of so many looks at its own noise.
+    """Largest ratio of expected to required error with the first dwells, with the allowance of so many looks at its own noise.
 
     Infinite where they do not determine the model, or leave nothing to judge the noise by.
     """
@@ -206,7 +206,7 @@ def _completed(parts: list[SoakPart], order: list[int]) -> list[SoakPart]:
     left = [k for k in range(len(parts)) if k not in order]
     while left:
         now = parts[order[-1]].temperature_C
-        # the same temperature again is no soak of its own: it comes when another lies between
+        # a repeated temperature is no separate soak: it comes when another lies between
         nearest = min(left, key=lambda k: (parts[k].temperature_C == now, abs(parts[k].temperature_C - now), k))
         order.append(nearest)
         left.remove(nearest)

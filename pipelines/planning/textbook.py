@@ -51,25 +51,27 @@ def reference_errors(against: PlanContext, recipe: Recipe) -> Array:
     try:
         return identified(against).errors
     except NotIdentified:
-        own = identified(plan_context(recipe, against.station, against.noise, slowest=float(against.state.time[-1])))
+        expected = identified(
+            plan_context(recipe, against.station, against.noise, slowest=float(against.state.time[-1]))
+        )
     model = list(recipe.effects)
-    names = [name for name, _ in own.names[0]]
+    names = [name for name, _ in expected.names[0]]
     for effect in _hidden(against.state, model):
         model.remove(effect)
     there = expected_errors(model, against.state, against.covariance)
-    errors = own.errors.copy()
+    errors = expected.errors.copy()
     errors[:, [k for k, name in enumerate(names) if name in model]] = there.errors
     return errors
 
 
 def _hidden(state: State, model: Sequence[str]) -> list[str]:
     """Effects of a model that a plan cannot identify beside the effects before them."""
-    kept: list[str] = []
+    visible: list[str] = []
     for effect in model:
-        visibility = visibilities(state, kept, 1.0, [effect])
+        visibility = visibilities(state, visible, 1.0, [effect])
         if effect in ("bias", "scale", "misalignment") or (visibility and visibility[0].seen):
-            kept.append(effect)
-    return [effect for effect in model if effect not in kept]
+            visible.append(effect)
+    return [effect for effect in model if effect not in visible]
 
 
 def seen_by(against: PlanContext, levels: Sequence[float]) -> tuple[str, ...]:

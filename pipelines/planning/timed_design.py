@@ -80,7 +80,7 @@ class TimedDesign:
         self._verification = len({(p.outer_deg, p.inner_deg) for p in recipe.verification})
 
     def dwell_lengths(self) -> tuple[float, ...]:
-        """Lengths of a dwell to try, s: the one with most information per time, and three and nine times that.
+        """Lengths of a dwell to try, s: the length with most information per time, and three and nine times that.
 
         Where slow wander dominates, the total time counts and not the number of dwells; longer dwells then need fewer records.
         """
@@ -136,10 +136,10 @@ class TimedDesign:
         covariance = dwell_covariance(time, dwell_s, replace(self.noise, instability=0.0))
         if self.noise.instability > 0.0:
             longest = max(self.slowest, _LONG_S * math.ceil(float(time.max()) / _LONG_S))
-            grid, values, own = _flicker(dwell_s, self.slowest if time.max() <= self.slowest else longest)
+            grid, values, variance = _flicker(dwell_s, self.slowest if time.max() <= self.slowest else longest)
             gap = np.abs(time[:, None] - time)
             flicker = np.interp(gap, grid, values)
-            np.fill_diagonal(flicker, own)
+            np.fill_diagonal(flicker, variance)
             covariance += self.noise.instability**2 * flicker
         return covariance
 
@@ -203,7 +203,7 @@ def normal_matrix(rows: Array, covariance: Array) -> Array:
 
 
 def short_of(heat: Array, levels: Sequence[float]) -> float:
-    """By how much a ramp (n,), °C, misses the ends of the required range, in parts of the missed distance that is allowed.
+    """Excess of the missed part of the range by a ramp (n,), °C, over the allowed part, relative to that; 0 where none.
 
     A model is not to be extrapolated: the devices must get within :data:`REACHED` of the range.
     """
@@ -324,7 +324,7 @@ def _shifted(counts: tuple[int, ...], step: int) -> Iterator[tuple[int, ...]]:
 def smallest_passing(passes: Callable[[int], bool], low: int, high: int) -> int | None:
     """The smallest number from low to high that passes, by bisection; None where ``high`` fails.
 
-    Every number above one that passes must pass, too.
+    Every number above a passing number must pass, too.
     """
     if not passes(high):
         return None

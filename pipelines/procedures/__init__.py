@@ -46,46 +46,58 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     Raises
     ------
     IncompleteProcedure
-        A module has no PROCEDURE, or one that declares what it cannot do, or two have one figure.
+        A module has no PROCEDURE, a procedure declares what it cannot do, or two procedures declare the same figure.
     """
     procedures: list[Procedure] = []
     for info in iter_modules(path):
         module = import_module(f"{package}.{info.name}")
-        one = getattr(module, "PROCEDURE", None)
-        own = (kind for kind in vars(module).values() if isinstance(kind, type) and kind.__module__ == module.__name__)
-        if one is None and not any(issubclass(kind, Procedure) and not isabstract(kind) for kind in own):
+        procedure = getattr(module, "PROCEDURE", None)
+        classes = (
+            kind for kind in vars(module).values() if isinstance(kind, type) and kind.__module__ == module.__name__
+        )
+        if procedure is None and not any(issubclass(kind, Procedure) and not isabstract(kind) for kind in classes):
             continue  # a part that procedures share
-        if not isinstance(one, Procedure) or one.name != info.name:
+        if not isinstance(procedure, Procedure) or procedure.name != info.name:
             raise IncompleteProcedure(
                 f"{package}.{info.name}: no PROCEDURE of this name, one is needed; define PROCEDURE = … with name = '{info.name}'"
             )
-        _refuse_half(f"{package}.{info.name}", one)
-        procedures.append(one)
+        _refuse_half(f"{package}.{info.name}", procedure)
+        procedures.append(procedure)
     figures = [figure.name for procedure in procedures for figure in procedure.figures]
     twice = sorted({name for name in figures if figures.count(name) > 1})
     if twice:
         raise IncompleteProcedure(f"{package}: figure {', '.join(twice)} is declared twice; rename one")
-    return {one.name: one for one in sorted(procedures, key=lambda one: (one.order, one.name))}
+    return {
+        procedure.name: procedure
+        for procedure in sorted(procedures, key=lambda procedure: (procedure.order, procedure.name))
+    }
 
 
-def _refuse_half(module: str, one: Procedure) -> None:
+def _refuse_half(module: str, procedure: Procedure) -> None:
     """Refuse a procedure that declares what it cannot do; abstract methods that are missing are refused by Python."""
-    on_station = isinstance(one, OnEquipment | SetsEquipment)
-    if one.roles and not on_station:
+    on_station = isinstance(procedure, OnEquipment | SetsEquipment)
+    if procedure.roles and not on_station:
         raise IncompleteProcedure(
-            f"{module}: roles {', '.join(one.roles)}, OnEquipment or SetsEquipment is needed; inherit one, or leave out the roles"
+            f"{module}: roles {', '.join(procedure.roles)}, OnEquipment or SetsEquipment is needed; "
+            "inherit one, or leave out the roles"
         )
-    if on_station and not one.roles:
+    if on_station and not procedure.roles:
         raise IncompleteProcedure(f"{module}: no roles, the equipment of its steps is needed; declare roles = (…,)")
-    if isinstance(one, Evaluated) != bool(one.figures):
-        what = "no figures, one is needed for Evaluated" if not one.figures else "figures, Evaluated is needed for them"
+    if isinstance(procedure, Evaluated) != bool(procedure.figures):
+        what = (
+            "no figures, one is needed for Evaluated"
+            if not procedure.figures
+            else "figures, Evaluated is needed for them"
+        )
         raise IncompleteProcedure(f"{module}: {what}; declare both, or neither")
-    if isinstance(one, InG) and not issubclass(one.part, NominalScale):
-        raise IncompleteProcedure(f"{module}: part {one.part.__name__}, a NominalScale is needed for InG; inherit it")
+    if isinstance(procedure, InG) and not issubclass(procedure.part, NominalScale):
+        raise IncompleteProcedure(
+            f"{module}: part {procedure.part.__name__}, a NominalScale is needed for InG; inherit it"
+        )
 
 
 PROCEDURES: Mapping[str, Procedure] = find_procedures(__name__, __path__)
-FIGURES: Mapping[str, FigureSpec] = {f.name: f for one in PROCEDURES.values() for f in one.figures}
+FIGURES: Mapping[str, FigureSpec] = {f.name: f for procedure in PROCEDURES.values() for f in procedure.figures}
 """Every figure that limits may name because a procedure determines it."""
 
 
@@ -190,19 +202,19 @@ def refuse_unusable(recipe: Recipe, station: StationConfig) -> None:
 
 EMPTY: dict[str, dict[str, str]] = {
     "procedure_points": {
-        "texts": "unit procedure axis series", "numbers": "setting value uncertainty", "whole": "number point",
+        "texts": "unit procedure axis series", "numbers": "setting value uncertainty", "integers": "number point",
     },
     "procedure_figures": {
         "texts": "unit procedure figure axis unit_text note", "numbers": "value uncertainty low high dof removed",
-        "whole": "number", "flags": "identified",
+        "integers": "number", "flags": "identified",
     },
-    "procedure_findings": {"texts": "unit procedure subject text", "whole": "number"},
+    "procedure_findings": {"texts": "unit procedure subject text", "integers": "number"},
     "procedure_results": {
-        "texts": "unit procedure role quantity axis unit_text", "whole": "number point",
+        "texts": "unit procedure role quantity axis unit_text", "integers": "number point",
         "numbers": " ".join(("setting value dof", *(f"u_{name}" for name in OF_RECORDS), *(f"c_{name}" for name in TERMS))),
     },
     "procedure_curves": {
-        "texts": "unit procedure axis model verdict reason name", "whole": "number row column",
+        "texts": "unit procedure axis model verdict reason name", "integers": "number row column",
         "numbers": "value p_value low_hz high_hz",
     },
 }  # fmt: skip
@@ -211,7 +223,7 @@ EMPTY: dict[str, dict[str, str]] = {
 
 def procedure_tables(results: Sequence[tuple[int, str, pd.DataFrame, Outcome]]) -> dict[str, pd.DataFrame]:
     """The tables of the stage ``procedures`` from the number, name, points, figures and findings of each procedure."""
-    points = [own.assign(number=number, procedure=name) for number, name, own, _ in results if len(own)]
+    points = [rows.assign(number=number, procedure=name) for number, name, rows, _ in results if len(rows)]
     figures = [
         {
             "unit": unit, "procedure": name, "number": number, "figure": value.figure, "axis": value.axis, "value": value.value,
@@ -227,12 +239,13 @@ def procedure_tables(results: Sequence[tuple[int, str, pd.DataFrame, Outcome]]) 
         for finding in outcome.findings
     ]
     compared = [
-        {"unit": unit, "procedure": name, "number": number, "role": PROCEDURES[name].roles[0], **one.row()}
-        for number, name, _, outcome in results for unit, values in outcome.results.items() for one in values
+        {"unit": unit, "procedure": name, "number": number, "role": PROCEDURES[name].roles[0], **result.row()}
+        for number, name, _, outcome in results for unit, values in outcome.results.items() for result in values
     ]  # fmt: skip
     curves = [
         {"unit": unit, "procedure": name, "number": number, **row}
-        for number, name, _, outcome in results for unit, own in outcome.curves.items() for one in own for row in one.rows()
+        for number, name, _, outcome in results
+        for unit, judged in outcome.curves.items() for curve in judged for row in curve.rows()
     ]  # fmt: skip
     made = (
         pd.concat(points, ignore_index=True) if points else points, pd.DataFrame(figures), pd.DataFrame(findings),

@@ -39,7 +39,7 @@ class Procedure(ABC):
     A subclass lists its steps. What else it can do is stated by the classes below that it inherits, each with abstract methods:
     :class:`Evaluated`, :class:`InG`, :class:`OnEquipment`, :class:`SetsEquipment`, :class:`FromWaveforms`, :class:`Compares`.
 
-    name : of the module, and ``kind`` in recipes · title : heading in the report · order : place in the reference
+    name : of the module, and ``kind`` in recipes · title : heading in the report · order : procedures are listed by it
     roles : equipment that a station must have · source : standard, edition and part · states : its results in one line
     """
 
@@ -61,7 +61,7 @@ class Procedure(ABC):
         return self.roles
 
     def missing_axes(self, part: Any, letters: Sequence[str]) -> list[str]:
-        """The axes that a part measures and that a device with these does not have: here the one that it names."""
+        """The axes that a part measures and that a device with these axes lacks: here the axis that the part names."""
         named = [part.axis] if hasattr(part, "axis") else getattr(part, "axes", [])
         return [axis for axis in named if axis not in letters]
 
@@ -70,7 +70,7 @@ class Procedure(ABC):
 
 
 class Evaluated(Procedure):
-    """A procedure with figures of its own; those of others come from the stages ``fit``, ``noise`` and ``grade``."""
+    """A procedure that yields figures from its points; those of others come from the stages ``fit``, ``noise`` and ``grade``."""
 
     @abstractmethod
     def reduce(self, part: Any, records: Records, device: Device) -> pd.DataFrame:
@@ -117,11 +117,11 @@ class Evaluated(Procedure):
 
 
 class RecordByRecord(Evaluated):
-    """A procedure whose records are reduced one by one, each for itself."""
+    """A procedure whose records are reduced independently of each other."""
 
     def reduce(self, part: Any, records: Records, device: Device) -> pd.DataFrame:
         """The points of every unit in every record."""
-        return point_table(row for one in taken(records) for row in self.points(part, one, device))
+        return point_table(row for measured in taken(records) for row in self.points(part, measured, device))
 
     @abstractmethod
     def points(self, part: Any, taken: Taken, device: Device) -> Iterable[Mapping[str, Any]]:
@@ -174,7 +174,7 @@ class FromWaveforms(Evaluated):
     """A procedure whose recordings may be made elsewhere and imported, one file a record.
 
     reference_unit : of the reference channel of such a recording, g or V
-    needs_reference : whether it gives no figure without one
+    needs_reference : whether it gives no figure without a recorded reference
     """
 
     reference_unit: ClassVar[str] = "g"
@@ -210,7 +210,7 @@ def refuse_unknown_effects(names: Sequence[str], known: Collection[str], test: s
 
 
 def scale_of(part: NominalScale, device: Device, unit: str) -> Array:
-    """Scale of a unit's axes, (3,), output per g: that of its calibration, else the nominal one of the part."""
+    """Scale of a unit's axes, (3,), output per g: that of its calibration, else the nominal scale of the part."""
     if unit in device.scale:
         return device.scale[unit]
     return np.full(3, np.nan if part.scale is None else part.scale)

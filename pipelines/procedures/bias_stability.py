@@ -45,17 +45,17 @@ class BiasStability(InG, RecordByRecord):
     )
 
     def steps(self, part: BiasStabilityPart, recipe: Recipe) -> list[ProcedureStep]:
-        """One record."""
+        """A single record in one pose."""
         pose = Pose(name="stability", outer_deg=part.pose_deg[0], inner_deg=part.pose_deg[1])
         return [ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.lasting_s, rate_hz=part.rate_hz)]
 
     def points(self, part: BiasStabilityPart, taken: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Means of 1 s in µg from the start of the record."""
         size, scale = round(part.rate_hz), scale_of(part, device, taken.unit)
-        for i, axis in enumerate(taken.own.letters):
-            second = block_means(taken.own.output[:, i], size) / scale[i] * MICRO
+        for i, axis in enumerate(taken.samples.letters):
+            second = block_means(taken.samples.output[:, i], size) / scale[i] * MICRO
             k = np.arange(second.size)
-            time = taken.own.time[0] + k * size / part.rate_hz
+            time = taken.samples.time[0] + k * size / part.rate_hz
             spread = second.std(ddof=1) if second.size > 1 else np.nan
             yield from point_rows(
                 unit=taken.unit,
@@ -71,14 +71,16 @@ class BiasStability(InG, RecordByRecord):
         """Figures of the worst axis; every definition as a finding, so that numbers of others can be compared."""
         rate = 1.0 / (round(part.rate_hz) / part.rate_hz)
         by_axis = {
-            str(axis): stability(own["value"].to_numpy(dtype=float), rate, device.noise.get((unit, str(axis))))
-            for axis, own in rows.groupby("axis", sort=False)
+            str(axis): stability(record["value"].to_numpy(dtype=float), rate, device.noise.get((unit, str(axis))))
+            for axis, record in rows.groupby("axis", sort=False)
         }
         names = zip(self.figures, ("sd_100s", "drift_h", "allan_100s"), strict=True)
-        figures = [worst([_figure(spec.name, key, axis, one) for axis, one in by_axis.items()]) for spec, key in names]
-        texts = [("definitions of bias stability", _text(axis, one)) for axis, one in by_axis.items()]
-        for axis, own in rows.groupby("axis", sort=False):
-            if told := disturbance_texts(disturbances(own["value"].to_numpy(dtype=float)), rate, "µg"):
+        figures = [
+            worst([_figure(spec.name, key, axis, found) for axis, found in by_axis.items()]) for spec, key in names
+        ]
+        texts = [("definitions of bias stability", _text(axis, found)) for axis, found in by_axis.items()]
+        for axis, record in rows.groupby("axis", sort=False):
+            if told := disturbance_texts(disturbances(record["value"].to_numpy(dtype=float)), rate, "µg"):
                 texts.append(
                     ("disturbed record", f"axis {axis}: {', '.join(told)}; the figures hold it, measure again")
                 )
@@ -89,8 +91,8 @@ class BiasStability(InG, RecordByRecord):
         short: list[Trace] = []
         long: list[Trace] = []
         for axis in axes_among(points["axis"]):
-            own = points[points["axis"] == axis]
-            seconds, value = numbers(own, "setting", "value")
+            record = points[points["axis"] == axis]
+            seconds, value = numbers(record, "setting", "value")
             time, value = seconds / 60.0, value - value.mean()
             for traces, count, width in ((short, 10, 0.4), (long, 100, 1.8)):
                 x, y = block_means(time, count), block_means(value, count)
@@ -101,16 +103,16 @@ class BiasStability(InG, RecordByRecord):
         return Chart(self.title, (Plot("thick: means of 100 s", *axes, (*short, *long)),))
 
 
-def _figure(name: str, key: str, axis: str, one: StabilityFigures) -> FigureValue:
-    value, error, ends = (getattr(one, f"{key}{end}") for end in ("", "_error", "_interval"))
-    return FigureValue(name, axis, value, error, *ends, dof=getattr(one, f"{key}_dof", float("nan")))
+def _figure(name: str, key: str, axis: str, found: StabilityFigures) -> FigureValue:
+    value, error, ends = (getattr(found, f"{key}{end}") for end in ("", "_error", "_interval"))
+    return FigureValue(name, axis, value, error, *ends, dof=getattr(found, f"{key}_dof", float("nan")))
 
 
-def _text(axis: str, one: StabilityFigures) -> str:
+def _text(axis: str, found: StabilityFigures) -> str:
     return (
-        f"axis {axis}, µg: standard deviation of 1 s means {one.sd_1s:.4g}, of 100 s means {one.sd_100s:.4g}; range of "
-        f"1 s means {one.range_1s:.4g}, of 100 s means {one.range_100s:.4g}; Allan deviation at 100 s "
-        f"{one.allan_100s:.4g}; drift {with_uncertainty(one.drift_h, 2.0 * one.drift_h_error)} µg/h (k = 2)"
+        f"axis {axis}, µg: standard deviation of 1 s means {found.sd_1s:.4g}, of 100 s means {found.sd_100s:.4g}; range of "
+        f"1 s means {found.range_1s:.4g}, of 100 s means {found.range_100s:.4g}; Allan deviation at 100 s "
+        f"{found.allan_100s:.4g}; drift {with_uncertainty(found.drift_h, 2.0 * found.drift_h_error)} µg/h (k = 2)"
     )
 
 

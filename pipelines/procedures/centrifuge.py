@@ -168,10 +168,10 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         ]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One constant speed."""
-        one = step.setting
-        rate = math.degrees(math.sqrt(one["force_g"] * 9.80665 / one["radius_m"]))
-        return equipment.spin(rate, int(one["direction"]), one["record_s"], slots, one["radius_m"])
+        """The recording at a constant speed of the arm."""
+        setting = step.setting
+        rate = math.degrees(math.sqrt(setting["force_g"] * 9.80665 / setting["radius_m"]))
+        return equipment.spin(rate, int(setting["direction"]), setting["record_s"], slots, setting["radius_m"])
 
     def points(self, part: CentrifugePart, taken: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Mean output in g over the acceleration by the measured rate."""
@@ -185,13 +185,13 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
             force, scatter = ratio * float(read[:, 1].mean()), float(read[:, 1].std(ddof=1)) / np.sqrt(len(read))
             linearity = 1e-6 * (part.reference_linearity_ppm or 0.0) * abs(force)
             common = math.hypot(common, linearity, abs(ratio) * scatter)
-        axis = INPUT if len(taken.own.letters) > INPUT else 0  # a device without z is mounted by its x
-        raw = taken.own.output[:, axis]
+        axis = INPUT if len(taken.samples.letters) > INPUT else 0  # a device without z is mounted by its x
+        raw = taken.samples.output[:, axis]
         output = raw / scale_of(part, device, taken.unit)[axis]
         clipped = device.at_end(raw) > 0
         error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), common))
         yield {
-            "unit": taken.unit, "axis": taken.own.letters[axis], "series": "output", "point": taken.number,
+            "unit": taken.unit, "axis": taken.samples.letters[axis], "series": "output", "point": taken.number,
             "setting": float(force), "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
             "spread": float(output.std(ddof=1)), "radius_m": radius, "by_rate": float(by_rate),
         }  # fmt: skip
@@ -239,7 +239,7 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         return figures, [*texts, *diagnosis_text(diagnosis)]
 
     def chart(self, part: CentrifugePart, points: pd.DataFrame) -> Chart:
-        """Departure from the straight line over the acceleration, with the polynomial; each radius has a line of its own."""
+        """Departure from the straight line over the acceleration, with the polynomial; each radius has its line."""
         if part.radii_m:
             traces = of_radii(points, 1e-6 * part.radius_um)
         else:
@@ -257,7 +257,7 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
 
 
 def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
-    """All terms with the input reversed; without it the four that one direction separates."""
+    """The terms of the fit: all with the input reversed; without it the four that one direction separates."""
     force, value, error = numbers(rows)
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
 

@@ -80,14 +80,14 @@ def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str
     else:
         out.append(("not determined", "K1′ is in the sensitivity and Koq in K2; measure with the units reversed"))
     each = ", ".join(
-        f"{radius:g} m {_stated(one, MICRO)} µm"
-        for radius, one in zip(sorted(radii, reverse=True), fit.radius_errors_m, strict=True)
+        f"{radius:g} m {_stated(error, MICRO)} µm"
+        for radius, error in zip(sorted(radii, reverse=True), fit.radius_errors_m, strict=True)
     )
     return [*out, ("errors of the radii", f"{each} (k = 2), by outputs and stated uncertainty together")]
 
 
-def _stated(one: tuple[float, float], factor: float) -> str:
-    return with_uncertainty(factor * one[0], 2.0 * factor * one[1])
+def _stated(estimate: tuple[float, float], factor: float) -> str:
+    return with_uncertainty(factor * estimate[0], 2.0 * factor * estimate[1])
 
 
 def of_radii(points: pd.DataFrame, radius_error_m: float) -> list[Trace]:

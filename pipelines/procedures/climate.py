@@ -23,7 +23,7 @@ class Leg:
 
 
 def leg_step(name: str, leg: Leg, soak: int) -> ProcedureStep:
-    """The record of a leg, a soak of its own: the chamber follows the unit, and nothing settles before it."""
+    """The record of a leg, which counts as a separate soak: the chamber follows the unit, and nothing settles before it."""
     setting = {
         "humidity_pct": leg.humidity_pct or 0.0, "pressure_hPa": leg.pressure_hPa,
         "change_s": leg.change_s, "hold_s": leg.hold_s,
@@ -36,6 +36,8 @@ def leg_step(name: str, leg: Leg, soak: int) -> ProcedureStep:
 
 def expose(equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
     """The recording of a leg that the climate unit carries out."""
-    one = step.setting
-    humidity = one["humidity_pct"] or None
-    return equipment.expose(step.temperature_C, humidity, one["pressure_hPa"], one["change_s"], one["hold_s"], slots)
+    setting = step.setting
+    humidity = setting["humidity_pct"] or None
+    return equipment.expose(
+        step.temperature_C, humidity, setting["pressure_hPa"], setting["change_s"], setting["hold_s"], slots
+    )

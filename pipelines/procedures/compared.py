@@ -24,7 +24,7 @@ MIDDLE_HZ = 160.0
 
 @dataclass(frozen=True)
 class ComparedResult:
-    """One result of one unit.
+    """A result of a unit, with the contributions to its uncertainty.
 
     point : number of the point that it belongs to; setting : frequency, Hz; NaN: of no frequency
     u : standard uncertainties by the names of :data:`OF_RECORDS`; that of ``transverse`` is by the motion as it was measured
@@ -71,7 +71,7 @@ class JudgedCurve:
     high_hz: float = float("nan")
 
     def rows(self) -> list[dict[str, Any]]:
-        """The rows of the table ``procedure_curves``: the lower triangle of the covariance, or one row without it."""
+        """The rows of the table ``procedure_curves``: the lower triangle of the covariance, or a single row without it."""
         about = {"axis": self.axis, "model": self.model, "verdict": self.verdict, "reason": self.reason,
                  "p_value": self.p_value, "low_hz": self.low_hz, "high_hz": self.high_hz}  # fmt: skip
         if not self.names:
@@ -94,11 +94,11 @@ def response_results(part: Any, rows: pd.DataFrame, out_unit: str) -> list[Compa
     Motion across the axis acts by the transverse sensitivity of the unit, at most ``transverse_percent``: with both rectangular
     and their angle uniform its standard uncertainty is that of the motion times the largest sensitivity over √6.
     """
-    kept = rows[np.isfinite(rows["value"])]
+    measured = rows[np.isfinite(rows["value"])]
     share = 1e-2 * part.transverse_percent / np.sqrt(6.0)
     repeated, turned = 1e-2 * part.repeatability_percent, part.repeatability_deg
     results: list[ComparedResult] = []
-    for row in rows_of(kept):
+    for row in rows_of(measured):
         value, across = float(row["value"]), share * 1e-2 * float(row["transverse_percent"])
         noise = without(float(row["uncertainty"]) / value, repeated, across)
         about: dict[str, Any] = {"axis": str(row["axis"]), "point": int(row["point"]), "setting": float(row["setting"])}
@@ -114,7 +114,7 @@ def response_results(part: Any, rows: pd.DataFrame, out_unit: str) -> list[Compa
                                       sensitivities=of_phase, **about))  # fmt: skip
     sizes = [result for result in results if result.quantity == "response_magnitude"]
     middle = getattr(part, "level_frequency_hz", MIDDLE_HZ)
-    near = min(sizes, key=lambda one: (abs(np.log(one.setting / middle)), one.point))
+    near = min(sizes, key=lambda result: (abs(np.log(result.setting / middle)), result.point))
     return [replace(near, quantity="reference_sensitivity"), *results]
 
 
@@ -134,10 +134,10 @@ def curve_results(curve: JudgedCurve, diagnosis: TransferDiagnosis, out_unit: st
     size = abs(fit.sensitivity)
     rest = ComparedResult("curve_sensitivity", curve.axis, f"{out_unit}/g", size, {"noise": size * fit.sensitivity_error},
                           by_share(size))  # fmt: skip
-    own = [(p.unit, *fit.of(p.name)[:2]) for p in fit.parameters]
+    parameters = [(p.unit, *fit.of(p.name)[:2]) for p in fit.parameters]
     return [rest] + [
         ComparedResult(f"curve_{name}", curve.axis, unit or "1", value, {"noise": error}, point=k)
-        for k, (name, (unit, value, error)) in enumerate(zip(curve.names[1:], own, strict=True), start=1)
+        for k, (name, (unit, value, error)) in enumerate(zip(curve.names[1:], parameters, strict=True), start=1)
     ]
 
 
@@ -161,8 +161,8 @@ def transfer_curve(axis: str, diagnosis: TransferDiagnosis, frequency: Array) ->
 
 
 def reason_of(diagnosis: Judged[Any]) -> str:
-    """What a model lacks, or why it cannot be judged; empty where neither is known."""
-    missing = [" or ".join(one.effects) for one in diagnosis.classes]
+    """The effects that a model lacks, or why it cannot be judged; empty where neither is known."""
+    missing = [" or ".join(missed.effects) for missed in diagnosis.classes]
     return diagnosis.reason or (f"it lacks {', '.join(missing)}" if missing else "")
 
 
@@ -171,6 +171,6 @@ def verdict_word(verdict: bool | None) -> str:  # noqa: FBT001 - it is the verdi
     return NOT_JUDGED if verdict is None else ADEQUATE if verdict else NOT_ADEQUATE
 
 
-def without(whole: float, *parts: float) -> float:
-    """What remains of a standard uncertainty without some of its parts."""
-    return float(np.sqrt(max(0.0, whole**2 - sum(part**2 for part in parts))))
+def without(total: float, *parts: float) -> float:
+    """Standard uncertainty that remains after the parts are subtracted in quadrature; 0 where they exceed it."""
+    return float(np.sqrt(max(0.0, total**2 - sum(part**2 for part in parts))))

@@ -98,25 +98,25 @@ class Exposure(InG, OnEquipment, RecordByRecord):
         return steps_of(part)
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One leg of the profile."""
+        """The recording of a leg of the profile."""
         return expose(equipment, step, slots)
 
     def points(self, part: ExposurePart, taken: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean of a record in µg with its time, temperature and force, and the noise of its samples; of a leg what it was."""
-        letters = taken.own.letters
-        output = taken.own.output / scale_of(part, device, taken.unit)[: len(letters)] * MICRO
+        letters = taken.samples.letters
+        output = taken.samples.output / scale_of(part, device, taken.unit)[: len(letters)] * MICRO
         if taken.record.step.role:
             return _leg_rows(taken, output)
         angles = (np.radians(float(taken.reading[name])) for name in ("outer_deg", "inner_deg"))
         force = force_from_angles(*angles)
-        noise = [noise_columns(short_noise(output[:, i], taken.own.rate_hz)) for i in range(len(letters))]
+        noise = [noise_columns(short_noise(output[:, i], taken.samples.rate_hz)) for i in range(len(letters))]
         series = taken.record.step.name.split()[0]
         return point_rows(
             unit=taken.unit,
             axis=letters,
             series=series if series in {BEFORE, AFTER, DRY} else BETWEEN,
             point=taken.number,
-            setting=float(taken.own.time.mean()),
+            setting=float(taken.samples.time.mean()),
             value=[output[:, i].mean() for i in range(len(letters))],
             uncertainty=error_of_mean(output),
             temperature=float(taken.reading["unit_C"]),
@@ -133,8 +133,8 @@ class Exposure(InG, OnEquipment, RecordByRecord):
             most = legs.iloc[int(legs["value"].to_numpy(dtype=float).argmax())]
             away = f"{most['value']:.0f} µg, axis {most['axis']}"
             texts["in the legs"] = f"largest departure of the output at rest from the beginning of a leg: {away}"
-        for axis, own in rows[rows["series"] != LEG].groupby("axis", sort=False):
-            still, settled, slope, why = corrected(own, plain=not part.stated.conditioned)
+        for axis, at_rest in rows[rows["series"] != LEG].groupby("axis", sort=False):
+            still, settled, slope, why = corrected(at_rest, plain=not part.stated.conditioned)
             if why:
                 texts["temperature"] = f"not corrected for, its difference is in both shifts and not in U: {why}"
             after = (still["series"] == AFTER).to_numpy()
@@ -143,15 +143,18 @@ class Exposure(InG, OnEquipment, RecordByRecord):
                     f"exposure: no records {BEFORE if after.any() else AFTER} it, both are needed; check the unit and its seat"
                 )
             _add(found, (BIAS, SCALE), str(axis), _shift(part, still, settled, after, str(axis)), slope, still, after)
-            for during, values, wet in in_environment(own, slope) if part.stated.conditioned else ():
+            for during, values, wet in in_environment(at_rest, slope) if part.stated.conditioned else ():
                 shift = _shift(part, during, values, wet, str(axis))
                 _add(found, (BIAS_IN, SCALE_IN), str(axis), shift, slope, during, wet)
         missing = UNLIKE if part.stated.conditioned else PLAIN
-        figures = [worst(own) if own else FigureValue.not_determined(name, "*", missing) for name, own in found.items()]
+        figures = [
+            worst(values) if values else FigureValue.not_determined(name, "*", missing)
+            for name, values in found.items()
+        ]
         return figures, list(texts.items())
 
     def of_lot(self, part: ExposurePart, points: pd.DataFrame) -> Texts:
-        """How far the air was from the profile at the ends of its legs."""
+        """Findings on the distance of the air from the profile at the ends of its legs."""
         legs = points[points["series"] == LEG]
         if legs.empty:
             return []
@@ -170,8 +173,8 @@ class Exposure(InG, OnEquipment, RecordByRecord):
         traces: list[Trace] = []
         number = np.ones(1)
         for axis in axes_among(points["axis"]):
-            own = points[(points["axis"] == axis) & (points["series"] != LEG)]
-            still, settled, *_ = corrected(own, plain=not part.stated.conditioned)
+            at_rest = points[(points["axis"] == axis) & (points["series"] != LEG)]
+            still, settled, *_ = corrected(at_rest, plain=not part.stated.conditioned)
             number = np.arange(1.0, len(still) + 1.0)
             before = (still["series"] == BEFORE).to_numpy()
             if not before.any():
@@ -188,17 +191,17 @@ class Exposure(InG, OnEquipment, RecordByRecord):
 
 
 def _leg_rows(taken: Taken, output: Array) -> list[dict[str, Any]]:
-    """What the air of a leg was at its end beside its order, and how far the outputs (n, m) in µg went from their beginning."""
+    """Points of a leg: air at its end against the order, and largest departure of the outputs (n, m), µg, from their begin."""
     air, step = taken.record.samples[REFERENCE].output, taken.record.step
     reached = air[-max(1, round(TAIL * len(air))) :].mean(axis=0)
     humidity = step.setting["humidity_pct"] or np.nan
     away = np.abs(output - output[0])
     return point_rows(
         unit=taken.unit,
-        axis=taken.own.letters,
+        axis=taken.samples.letters,
         series=LEG,
         point=taken.number,
-        setting=float(taken.own.time.mean()),
+        setting=float(taken.samples.time.mean()),
         value=list(away.max(axis=0)),
         uncertainty=list(np.std(np.diff(output, axis=0), axis=0)) if len(output) > 1 else np.nan,
         temperature=float(reached[0]),
@@ -228,9 +231,9 @@ def _add(
     """The figures of a shift, with the error of the correction for the difference of temperature in U."""
     temperature = rows["temperature"].to_numpy(dtype=float)
     apart = abs(float(temperature[later].mean() - temperature[~later].mean())) if slope.u.any() else 0.0
-    for name, one, row in zip(names, (shift.bias, shift.scale), (0, 1 + AXES.index(axis)), strict=True):
+    for name, change, row in zip(names, (shift.bias, shift.scale), (0, 1 + AXES.index(axis)), strict=True):
         found[name].append(
-            FigureValue(name, axis, one.value, float(np.hypot(one.u, slope.u[row] * apart)))
+            FigureValue(name, axis, change.value, float(np.hypot(change.u, slope.u[row] * apart)))
         )  # µg/g: ppm
 
 

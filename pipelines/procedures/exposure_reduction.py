@@ -65,12 +65,12 @@ def in_environment(rows: pd.DataFrame, slope: Slope) -> list[tuple[pd.DataFrame,
     inside, dry = rows[rows["series"] == BETWEEN], rows[rows["series"].isin([BEFORE, DRY])]
     pairs: list[tuple[pd.DataFrame, Array, Flags]] = []
     for start in range(0, len(inside), len(FACES)):
-        own = inside.iloc[start : start + len(FACES)]
-        at = float(own["temperature"].mean())
+        wet_rows = inside.iloc[start : start + len(FACES)]
+        at = float(wet_rows["temperature"].mean())
         same = dry[np.abs(dry["temperature"] - at) < 2.0 * SAME_K]
         if same.empty:
             continue
-        both = pd.concat([same, own])
+        both = pd.concat([same, wet_rows])
         wet = (both["series"] == BETWEEN).to_numpy()
         pairs.append((both, slope._replace(at_C=at).to_one(both, numbers(both, "value")[0]), wet))
     return pairs

@@ -62,12 +62,12 @@ class ExposurePart(NominalScale):
             raise ValueError(
                 f"no exposure profile '{self.profile}', {', '.join(exposure_profiles())} are there; choose one"
             )
-        own = self.stated
+        profile = self.stated
         for key in ("low_C", "high_C", "pressure_hPa"):
-            stated, used = getattr(self, key) is not None, key in own.levels()
+            stated, used = getattr(self, key) is not None, key in profile.levels()
             if stated and not used:
                 raise ValueError(f"{key}: profile {self.profile} has no such level; leave it out")
-            if used and not stated and getattr(own, key) is None:
+            if used and not stated and getattr(profile, key) is None:
                 raise ValueError(f"{key}: missing, profile {self.profile} has none of its own; state it")
         low, high = self.level("low_C"), self.level("high_C")
         if low is not None and high is not None and not low < high:
@@ -81,8 +81,8 @@ class ExposurePart(NominalScale):
 
     def level(self, key: str) -> float | None:
         """A level of the recipe, or else of the profile."""
-        own: float | None = getattr(self, key)
-        return getattr(self.stated, key) if own is None else own
+        ordered: float | None = getattr(self, key)
+        return getattr(self.stated, key) if ordered is None else ordered
 
     def temperature_of(self, leg: ExposureLeg) -> float:
         """Temperature of a leg, °C."""
@@ -111,9 +111,9 @@ class ExposurePart(NominalScale):
         if not self.stated.conditioned:
             return []
         measured = {self.temperature_of(leg) for leg in self.stated.legs if leg.measured}
-        others = [one for one in sorted(measured) if abs(one - self.temperature_C) > SAME_K]
-        below = [] if any(one < self.temperature_C for one in others) else [self.temperature_C - self.around_K]
-        above = [] if any(one > self.temperature_C for one in others) else [self.temperature_C + self.around_K]
+        others = [degrees for degrees in sorted(measured) if abs(degrees - self.temperature_C) > SAME_K]
+        below = [] if any(degrees < self.temperature_C for degrees in others) else [self.temperature_C - self.around_K]
+        above = [] if any(degrees > self.temperature_C for degrees in others) else [self.temperature_C + self.around_K]
         return [*below, *others, *above]
 
     def temperatures(self) -> dict[str, float]:
@@ -122,7 +122,7 @@ class ExposurePart(NominalScale):
         return {
             **{key: value for key, value in keys.items() if value is not None and key in self.stated.levels()},
             "temperature_C": self.temperature_C,
-            **{f"{one - self.temperature_C:+g} K from temperature_C:": one for one in self.dry()},
+            **{f"{degrees - self.temperature_C:+g} K from temperature_C:": degrees for degrees in self.dry()},
         }
 
 
@@ -147,12 +147,12 @@ def steps_of(part: ExposurePart) -> list[ProcedureStep]:
         poses(f"{DRY} {at:g}", at)
     poses(BEFORE, part.temperature_C, part.repeats)
     change_s = MINUTE_S
-    for name, stated, one in part.legs():
+    for name, stated, leg in part.legs():
         if stated.by_unit:
-            steps.append(leg_step(name, one, steps[-1].soak + 1))
-            change_s = max(change_s, one.change_s)
+            steps.append(leg_step(name, leg, steps[-1].soak + 1))
+            change_s = max(change_s, leg.change_s)
         if stated.measured:
-            poses(name, one.temperature_C)
+            poses(name, leg.temperature_C)
     if part.stated.by_unit:
         hold_s = MINUTE_S * part.stated.recovery_min
         rest = Leg(part.temperature_C, None, AMBIENT_HPA, change_s, hold_s)

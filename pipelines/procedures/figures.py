@@ -22,7 +22,7 @@ REACH_95 = float(normal_upper(TAIL))
 class FigureSpec:
     """A figure that limits may name: its key, unit, and meaning in one line.
 
-    one_axis : the figure is that of a single axis, so that a limit may be a least value; of others the largest axis is kept
+    one_axis : the figure is that of a single axis, so that a limit may be a least value; of others the largest axis is stated
     """
 
     name: str
@@ -97,7 +97,7 @@ class Outcome:
 
 
 def worst(values: Sequence[FigureValue]) -> FigureValue:
-    """The deciding axis: one that is not identified, or no number, else the largest magnitude with twice its uncertainty.
+    """The deciding axis: an axis that is not identified or no number, else the largest magnitude plus twice its uncertainty.
 
     Its interval is that of the largest magnitude of all axes; see :func:`interval_of_largest`.
     """
@@ -106,7 +106,7 @@ def worst(values: Sequence[FigureValue]) -> FigureValue:
         bound = abs(value.value) + 2.0 * value.uncertainty
         return bound if np.isfinite(bound) else np.inf  # max() passes over a nan that is not the first
 
-    missing = next((one for one in values if not one.identified), None)
+    missing = next((value for value in values if not value.identified), None)
     if missing is not None:
         return missing
     deciding = max(values, key=size)
@@ -126,23 +126,23 @@ def interval_of_largest(values: Sequence[FigureValue], sign: float) -> tuple[flo
     """
     ends = [_ends(value) for value in values]
     magnitudes = [
-        (low, high) if one.value >= 0.0 else (-high, -low) for one, (low, high) in zip(values, ends, strict=True)
+        (low, high) if figure.value >= 0.0 else (-high, -low) for figure, (low, high) in zip(values, ends, strict=True)
     ]
     tail = 1.0 - (1.0 - TAIL) ** (1.0 / len(values))
-    inner = max(_lower(one, low, tail) for one, (low, _) in zip(values, magnitudes, strict=True))
+    inner = max(_lower(value, low, tail) for value, (low, _) in zip(values, magnitudes, strict=True))
     outer = max(high for _, high in magnitudes)
     if inner >= 0.0:
         return (inner, outer) if sign > 0.0 else (-outer, -inner)
     hull = min(low for low, _ in ends), max(high for _, high in ends)
-    own = (inner, outer) if sign > 0.0 else (-outer, -inner)
-    return min(hull[0], own[0]), max(hull[1], own[1])
+    interval = (inner, outer) if sign > 0.0 else (-outer, -inner)
+    return min(hull[0], interval[0]), max(hull[1], interval[1])
 
 
-def _ends(one: FigureValue) -> tuple[float, float]:
+def _ends(figure: FigureValue) -> tuple[float, float]:
     """The 95 % interval of one axis; that of a normal law where none is stated."""
-    reach = REACH_95 * one.uncertainty
-    low = one.low if not np.isnan(one.low) else one.value - reach
-    high = one.high if not np.isnan(one.high) else one.value + reach
+    reach = REACH_95 * figure.uncertainty
+    low = figure.low if not np.isnan(figure.low) else figure.value - reach
+    high = figure.high if not np.isnan(figure.high) else figure.value + reach
     return low, high
 
 
@@ -158,7 +158,7 @@ SMALLEST_FIXED, LARGEST_FIXED = 1e-5, 1e8  # of U in fixed notation
 
 
 def with_uncertainty(value: float, expanded: float) -> str:
-    """``value ± U``, U to two digits and the value to the same place (GUM 7.2.6)."""
+    """``value ± U``, U to two digits and the value to the same decimal (GUM 7.2.6)."""
     if not math.isfinite(expanded) or expanded <= 0.0:
         return f"{value:.4g}".replace("-", MINUS)
     if not SMALLEST_FIXED <= expanded < LARGEST_FIXED:
@@ -198,10 +198,10 @@ def diagnosis_texts(
     verdict = "adequate" if diagnosis.adequate else "not adequate"
     text = f"{model} is {verdict} ({probability(p_value(diagnosis.fit))}), rms residual {before} {unit}"
     out = [(subject, text + where)]
-    for one in diagnosis.classes:
-        effect, *rivals = one.effects
+    for missed in diagnosis.classes:
+        effect, *rivals = missed.effects
         alike = f"; {by} do not separate it from {', '.join(rivals)}" if rivals else ""
-        out.append(("missing effect", f"{effect}: {size(effect)}, {probability(one.p_value)}{alike}"))
+        out.append(("missing effect", f"{effect}: {size(effect)}, {probability(missed.p_value)}{alike}"))
     if diagnosis.classes:
         held = " → ".join(f"{value:.2f}" for value in diagnosis.left_out)
         text = f"rms residual {before} → {after} {unit}; {left_out} left out, in standard uncertainties: {held}"
@@ -212,7 +212,7 @@ def diagnosis_texts(
 
 
 def signed(value: float, places: int) -> str:
-    """A difference with its sign to some places; what rounds to zero has none."""
+    """A difference with its sign to some decimals; a difference that rounds to zero has no sign."""
     shown = round(value, places)
     text = f"{shown:+.{places}f}" if shown else f"{0.0:.{places}f}"
     return text.replace("-", MINUS)

@@ -38,7 +38,7 @@ class MultiPosition(Procedure):
             ]
             every = [*fit, *checks]
             if recipe.verification_order == "interleaved":  # those for verification spread among the others
-                at = [(k + 0.5) / len(own) for own in (fit, checks) for k in range(len(own))]
+                at = [(k + 0.5) / len(group) for group in (fit, checks) for k in range(len(group))]
                 every = [every[k] for k in sorted(range(len(every)), key=lambda k: (at[k], k))]
             steps += every
         return steps

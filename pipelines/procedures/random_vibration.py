@@ -120,36 +120,36 @@ class RandomVibration(InG, OnEquipment, Compares):
         ]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One level of the controller's profile."""
-        one = step.setting
-        profile = vibration_profiles()[int(one["profile"])]
-        return equipment.random(profile, one["level_g"], int(one["axis"]), step.lasting_s or 0.0, slots)
+        """The recording at one level of the controller's profile."""
+        setting = step.setting
+        profile = vibration_profiles()[int(setting["profile"])]
+        return equipment.random(profile, setting["level_g"], int(setting["axis"]), step.lasting_s or 0.0, slots)
 
     def reduce(self, part: RandomVibrationPart, records: Records, device: Device) -> pd.DataFrame:
         """Shift of the mean of every unit at every level, and the density of the reference at the largest level."""
         axis = AXES.index(part.axis)
         rows: list[dict[str, Any]] = []
-        for one in taken(records):
-            reference = one.record.samples[REFERENCE]
+        for measured in taken(records):
+            reference = measured.record.samples[REFERENCE]
             rate = reference.rate_hz
             first, last = (round(at * rate) for at in (1.0 + GUARD_S, 1.0 + part.seconds - GUARD_S))
             driven = reference.output[first:last, axis]
             level = float(np.sqrt(np.mean((driven - driven.mean()) ** 2)))
-            output, scale = one.own.output[:, axis], scale_of(part, device, one.unit)[axis]
-            shift, error = _shift(output / scale, one.own.rate_hz, part.seconds)
+            output, scale = measured.samples.output[:, axis], scale_of(part, device, measured.unit)[axis]
+            shift, error = _shift(output / scale, measured.samples.rate_hz, part.seconds)
             silent = float(np.std(output)) < 0.2 * level * scale
             rows.append(
                 {
-                    "unit": one.unit, "axis": part.axis, "series": "shift", "point": one.number, "setting": level,
+                    "unit": measured.unit, "axis": part.axis, "series": "shift", "point": measured.number, "setting": level,
                     "value": np.nan if silent else MICRO * shift, "uncertainty": MICRO * error,
                     "clipped": float(device.at_end(output)),
-                    "ordered_g": one.record.step.setting["level_g"],
+                    "ordered_g": measured.record.step.setting["level_g"],
                 }
             )  # fmt: skip
-            if one.number == len(records) - 1:
-                rows += _density(one.unit, part.axis, driven, rate)
-                about = {"unit": one.unit, "temperature_C": part.temperature_C}
-                rows += [row | about for row in _response(part, one.number, (reference, one.own), device)]
+            if measured.number == len(records) - 1:
+                rows += _density(measured.unit, part.axis, driven, rate)
+                about = {"unit": measured.unit, "temperature_C": part.temperature_C}
+                rows += [row | about for row in _response(part, measured.number, (reference, measured.samples), device)]
         return point_table(rows)
 
     def of_unit(self, part: RandomVibrationPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
@@ -178,11 +178,11 @@ class RandomVibration(InG, OnEquipment, Compares):
         slope = figures[self.figures[0].name]
         first = ComparedResult("vibration_rectification", part.axis, "µg/g²", slope.value, {"noise": slope.uncertainty},
                                by_share(2.0 * abs(slope.value)))  # fmt: skip
-        kept = rows[(rows["series"] == "response") & np.isfinite(rows["value"])]
-        if len(kept) < FEWEST_POINTS:
+        response = rows[(rows["series"] == "response") & np.isfinite(rows["value"])]
+        if len(response) < FEWEST_POINTS:
             return [first], []
         try:
-            results, curves = transfer_results(part, _diagnosis(part, kept), kept, out_unit)
+            results, curves = transfer_results(part, _diagnosis(part, response), response, out_unit)
         except NotIdentified:
             return [first], []
         return [first, *results], curves
@@ -250,14 +250,14 @@ def _response(
     """The points of the transfer function at one level, by the clock of the reference; none of an output that is constant."""
     first, last = 1.0 + GUARD_S, 1.0 + part.seconds - GUARD_S
     cut: list[UnitRecord] = []
-    for one in pair:
-        a, b = (round(at * one.rate_hz) for at in (first, last))
-        cut.append(UnitRecord(one.time[a:b], one.output[a:b]))
+    for channel in pair:
+        a, b = (round(at * channel.rate_hz) for at in (first, last))
+        cut.append(UnitRecord(channel.time[a:b], channel.output[a:b]))
     axis = AXES.index(part.axis)
     if float(np.ptp(cut[1].output[:, axis])) == 0.0:
         return []
     try:
-        clock = clock_departure(*((one.output[:, axis], one.rate_hz) for one in cut))
+        clock = clock_departure(*((channel.output[:, axis], channel.rate_hz) for channel in cut))
         points = response_bands(part, number, (cut[0], cut[1]), axis, device, clock)
     except NotIdentified:
         return []
@@ -272,16 +272,16 @@ def _diagnosis(part: RandomVibrationPart, response: pd.DataFrame) -> TransferDia
 def _transfer(part: RandomVibrationPart, response: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:
     """Figures and findings of the transfer function, judged as that of a sweep."""
     names = ("random_bandwidth_hz", "random_natural_hz", "random_damping")
-    kept = response[np.isfinite(response["value"])]
-    note = f"{len(kept)} bands follow the vibration, {FEWEST_POINTS} are needed; check cable and range"
-    if len(kept) >= FEWEST_POINTS:
+    measured = response[np.isfinite(response["value"])]
+    note = f"{len(measured)} bands follow the vibration, {FEWEST_POINTS} are needed; check cable and range"
+    if len(measured) >= FEWEST_POINTS:
         try:
-            diagnosis = _diagnosis(part, kept)
+            diagnosis = _diagnosis(part, measured)
         except NotIdentified as problem:
             note = str(problem)
         else:
-            made = figures_of_model(part.axis, diagnosis, transfer_points(kept), "random")
-            return made, [*diagnosis_text(diagnosis), *condition_texts(kept)]
+            made = figures_of_model(part.axis, diagnosis, transfer_points(measured), "random")
+            return made, [*diagnosis_text(diagnosis), *condition_texts(measured)]
     return [FigureValue.not_determined(name, part.axis, note) for name in names], []
 
 
@@ -320,9 +320,9 @@ def _density(unit: str, axis: str, driven: np.ndarray, rate_hz: float) -> list[d
 def _target(part: RandomVibrationPart, points: pd.DataFrame, f: np.ndarray) -> np.ndarray:
     """The ordered density at the largest level."""
     profile = np.array(load_vibration_profile(part.profile).breakpoints)
-    whole = overall_level(profile[:, 0], profile[:, 1])
+    nominal = overall_level(profile[:, 0], profile[:, 1])
     level = float(points.loc[points["series"] == "shift", "ordered_g"].iloc[-1])
-    return interpolated(f, profile[:, 0], profile[:, 1]) * (level / whole) ** 2
+    return interpolated(f, profile[:, 0], profile[:, 1]) * (level / nominal) ** 2
 
 
 PROCEDURE = RandomVibration()

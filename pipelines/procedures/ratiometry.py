@@ -84,7 +84,7 @@ class Ratiometry(SetsEquipment, RecordByRecord):
     )
 
     def steps(self, part: RatiometryPart, recipe: Recipe) -> list[ProcedureStep]:
-        """Both faces of every axis, at each voltage."""
+        """Records on both faces of every axis, at each voltage."""
         return [
             ProcedureStep(
                 f"{volt:g} V, {axis} {side}",
@@ -119,14 +119,14 @@ class Ratiometry(SetsEquipment, RecordByRecord):
 
     def points(self, part: RatiometryPart, taken: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Mean of the axis on a face at a voltage, in the unit of the output, with the measured supply."""
-        setting, rate = taken.record.step.setting, taken.own.rate_hz
+        setting, rate = taken.record.step.setting, taken.samples.rate_hz
         axis = int(setting["axis"])
-        output = taken.own.output[:, axis]
+        output = taken.samples.output[:, axis]
         point = {
             "unit": taken.unit, "axis": AXES[axis], "series": "face", "point": taken.number,
             "setting": setting["supply_V"], "value": float(output.mean()),
             "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": setting["side"],
-            "window_s": output.size / rate, "time_s": float(taken.own.time.mean()),
+            "window_s": output.size / rate, "time_s": float(taken.samples.time.mean()),
             "measured_V": float(taken.reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
         }  # fmt: skip
         yield point | noise_columns(short_noise(output, rate))
@@ -137,21 +137,22 @@ class Ratiometry(SetsEquipment, RecordByRecord):
             raise NotIdentified("the output is constant; check cable and supply")
         by_axis = {axis: over_supply(part, rows[rows["axis"] == axis]) for axis in part.axes}
         figures = [
-            worst([_figure(spec.name, axis, one, device) for axis, one in by_axis.items()]) for spec in self.figures
+            worst([_figure(spec.name, axis, follows, device) for axis, follows in by_axis.items()])
+            for spec in self.figures
         ]
-        return figures, [(f"axis {axis}", _text(part, one)) for axis, one in by_axis.items()]
+        return figures, [(f"axis {axis}", _text(part, follows)) for axis, follows in by_axis.items()]
 
     def chart(self, part: RatiometryPart, points: pd.DataFrame) -> Chart:
         """Departures of sensitivity and zero over the supply voltage."""
         shown: tuple[list[Trace], list[Trace]] = ([], [])
         for k, axis in enumerate(part.axes):
-            one = over_supply(part, points[points["axis"] == axis])
-            order = np.argsort(one.supply)
-            aside = 0.015 * (k - 1) * float(np.ptp(one.supply))  # so that no bar hides another
-            at, name, role = one.supply[order] + aside, f"axis {axis}, U (k = 2)", cast("Role", axis)
+            follows = over_supply(part, points[points["axis"] == axis])
+            order = np.argsort(follows.supply)
+            aside = 0.015 * (k - 1) * float(np.ptp(follows.supply))  # so that no bar hides another
+            at, name, role = follows.supply[order] + aside, f"axis {axis}, U (k = 2)", cast("Role", axis)
             for traces, factor, value, error in (
-                (shown[0], 100.0, one.sensitivity, one.sensitivity_error),
-                (shown[1], 1e3, one.zero_g, one.zero_error_g),
+                (shown[0], 100.0, follows.sensitivity, follows.sensitivity_error),
+                (shown[1], 1e3, follows.zero_g, follows.zero_error_g),
             ):
                 traces.append(Trace(name, at, factor * value[order], role=role, error=2.0 * factor * error[order]))
                 traces.append(Trace("", at, factor * value[order], "line", role, legend=False))
@@ -173,12 +174,12 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
     means = np.full((len(supplies), 2), np.nan)
     errors, measured = means.copy(), np.full(len(supplies), np.nan)
     for k, volt in enumerate(supplies):
-        own = rows[rows["setting"] == volt]
-        measured[k] = float(own["measured_V"].mean()) if len(own) else np.nan
+        at_volt = rows[rows["setting"] == volt]
+        measured[k] = float(at_volt["measured_V"].mean()) if len(at_volt) else np.nan
         for side in (0, 1):
-            one = own[own["side"] == side]
-            if len(one):
-                means[k, side], errors[k, side] = float(one["value"].iloc[0]), float(one["uncertainty"].iloc[0])
+            face = at_volt[at_volt["side"] == side]
+            if len(face):
+                means[k, side], errors[k, side] = float(face["value"].iloc[0]), float(face["uncertainty"].iloc[0])
     zero, sensitivity, error = zero_and_sensitivity(means, errors)
     noise, window = pooled_noise(rows), float(rows["window_s"].mean())
     # both faces of a voltage follow each other: slow wander is the same on them, so their mean has it like one longer record,
@@ -186,13 +187,13 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
     faces, voltages = _times_between(rows)
     zero_error = np.maximum(error, difference_error(noise, 2.0 * window, voltages) / np.sqrt(2.0))
     error = np.maximum(error, 0.5 * difference_error(noise, window, faces))
-    own = 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0)
-    error, zero_error = np.hypot(error, own), np.hypot(zero_error, own)
+    at_volt = 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0)
+    error, zero_error = np.hypot(error, at_volt), np.hypot(zero_error, at_volt)
     return departures(measured, zero, sensitivity, error, follows=part.follows, zero_error=zero_error)
 
 
 def _times_between(rows: pd.DataFrame) -> tuple[float, float]:
-    """Mean times between the two faces of a voltage, and between a voltage and the first one, s; 0 where none are known."""
+    """Mean times between the two faces of a voltage, and between a voltage and the first voltage, s; 0 where none are known."""
     if "time_s" not in rows:  # points of earlier versions have none
         return 0.0, 0.0
     by_voltage = rows.groupby("setting", sort=False)["time_s"]
@@ -201,26 +202,26 @@ def _times_between(rows: pd.DataFrame) -> tuple[float, float]:
     return float(by_voltage.agg(np.ptp).mean()), apart
 
 
-def _figure(name: str, axis: str, one: Follows, device: Device) -> FigureValue:
-    if not np.all(np.isfinite(one.sensitivity)):
+def _figure(name: str, axis: str, follows: Follows, device: Device) -> FigureValue:
+    if not np.all(np.isfinite(follows.sensitivity)):
         note = "a face was not recorded at a voltage; measure again"
         return FigureValue.not_determined(name, axis, note)
     if name == SENSITIVITY:
-        value, error, _ = largest_departure(one.supply, one.sensitivity, one.own_error)
+        value, error, _ = largest_departure(follows.supply, follows.sensitivity, follows.own_error)
         return FigureValue(name, axis, 100.0 * value, 100.0 * error)
     if name == SLOPE:
-        return FigureValue(name, axis, MICRO * one.slope_g_V, MICRO * one.slope_error_g_V)
-    value, error, _ = largest_departure(one.supply, one.zero_g, one.own_zero_error)
-    share = 100.0 * one.scale / device.full_scale
+        return FigureValue(name, axis, MICRO * follows.slope_g_V, MICRO * follows.slope_error_g_V)
+    value, error, _ = largest_departure(follows.supply, follows.zero_g, follows.own_zero_error)
+    share = 100.0 * follows.scale / device.full_scale
     return FigureValue(name, axis, share * value, share * error)
 
 
-def _text(part: RatiometryPart, one: Follows) -> str:
+def _text(part: RatiometryPart, follows: Follows) -> str:
     what = "ratiometric output" if part.follows else "output independent of the supply"
     return (
-        f"{what}: sensitivity {100.0 * one.sensitivity[int(np.argmax(np.abs(one.sensitivity)))]:+.3g} %, zero "
-        f"{with_uncertainty(MICRO * one.slope_g_V, 2.0 * MICRO * one.slope_error_g_V)} µg/V (k = 2), from "
-        f"{one.supply.min():.4g} to {one.supply.max():.4g} V as the reader measures them"
+        f"{what}: sensitivity {100.0 * follows.sensitivity[int(np.argmax(np.abs(follows.sensitivity)))]:+.3g} %, zero "
+        f"{with_uncertainty(MICRO * follows.slope_g_V, 2.0 * MICRO * follows.slope_error_g_V)} µg/V (k = 2), from "
+        f"{follows.supply.min():.4g} to {follows.supply.max():.4g} V as the reader measures them"
     )
 
 

@@ -110,13 +110,13 @@ Records = Sequence[ProcedureRecord]
 
 
 class Taken(NamedTuple):
-    """What one record holds of one unit; ``number`` is that of the record within the procedure, from 0."""
+    """The part of a record that belongs to one unit; ``number`` is that of the record within the procedure, from 0."""
 
     number: int
     record: ProcedureRecord
     unit: str
     reading: Mapping[str, Any]
-    own: UnitRecord
+    samples: UnitRecord
 
 
 def taken(records: Records) -> Iterator[Taken]:
@@ -134,7 +134,7 @@ END = 1e-4
 
 @dataclass(frozen=True)
 class Device:
-    """The units before the procedure: nominal scale from the full scale, and their calibration if there is one.
+    """The units before the procedure: nominal scale from the full scale, and their calibration if they have been calibrated.
 
     scale : (3,) output per g of each axis, by unit; full_scale, out_unit : of the lot
     scale_error : (3,) standard uncertainty of the scale as a share
@@ -165,11 +165,11 @@ def procedure_record(
     for table in samples:
         output, time = table[list(AXES)].to_numpy(dtype=float), table["time_s"].to_numpy(dtype=float)
         for unit, rows in table.groupby("unit", sort=False).indices.items():
-            own = output[rows] if unit == REFERENCE else output[rows, :axes]
-            parts.setdefault(str(unit), []).append((time[rows], own))
+            channels = output[rows] if unit == REFERENCE else output[rows, :axes]
+            parts.setdefault(str(unit), []).append((time[rows], channels))
     joined = {
-        unit: UnitRecord(np.concatenate([t for t, _ in own]), np.concatenate([o for _, o in own]))
-        for unit, own in parts.items()
+        unit: UnitRecord(np.concatenate([t for t, _ in pieces]), np.concatenate([o for _, o in pieces]))
+        for unit, pieces in parts.items()
     }
     return ProcedureRecord(number, step, readings, joined)
 
@@ -186,9 +186,9 @@ def numbers(rows: pd.DataFrame, *names: str) -> list[Array]:
 
 
 def point_rows(**columns: Any) -> list[dict[str, Any]]:
-    """Rows of points from columns in their order; what is one value, not a sequence, is that of every row."""
+    """Rows of points from columns in their order; a scalar is repeated in every row."""
     count = max(np.size(column) for column in columns.values())
-    spread = {name: [one] * count if np.ndim(one) == 0 else one for name, one in columns.items()}
+    spread = {name: [column] * count if np.ndim(column) == 0 else column for name, column in columns.items()}
     return [dict(zip(spread, row, strict=True)) for row in zip(*spread.values(), strict=True)]
 
 
@@ -196,7 +196,9 @@ def point_table(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     """Points from rows with unit, axis, series, point, setting, value, uncertainty and further numbers."""
     made = pd.DataFrame(list(rows))
     return (
-        made if len(made) else empty_table(texts="unit axis series", whole="point", numbers="setting value uncertainty")
+        made
+        if len(made)
+        else empty_table(texts="unit axis series", integers="point", numbers="setting value uncertainty")
     )
 
 

@@ -70,7 +70,7 @@ class Rotation(InG, Evaluated):
         made: list[ProcedureStep] = []
         for plane in part.planes:
             axis, other = AT_REST[plane]
-            # of the two ends this is the one from which the outer axis has less way between planes
+            # from this end of the turn the outer axis has less way between planes
             end = part.end_deg if axis == "inner" else -part.end_deg
             turns = tuple(
                 Turn(axis, to, rate, part.stand_s)
@@ -86,7 +86,7 @@ class Rotation(InG, Evaluated):
         return made
 
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a table that cannot turn so far or so fast, and one whose encoder's delay is not stated."""
+        """Refuse a table that cannot turn so far or so fast, and a table whose encoder delay is not stated."""
         super().check(part, recipe, station)
         for axis in sorted({AT_REST[plane][0] for plane in part.planes}):
             profile, limits = profile_of(getattr(station.devices, axis)), station.limits
@@ -130,7 +130,7 @@ class Rotation(InG, Evaluated):
 
     def reduce(self, part: RotationPart, records: Records, device: Device) -> pd.DataFrame:
         """Means over ten degrees of every sweep, and at rest, with what the encoder says of them."""
-        each = groupby(taken(records), key=lambda one: one.number)
+        each = groupby(taken(records), key=lambda measured: measured.number)
         return point_table(
             row
             for number, units in each
@@ -168,7 +168,7 @@ class Rotation(InG, Evaluated):
         return figures, [*_coefficients(fit, letters), *_drive(part, rows), *_open(part), *_diagnosis(diagnosis)]
 
     def chart(self, part: RotationPart, points: pd.DataFrame) -> Chart | None:
-        """What bias, scale, misalignment, delay and place leave over the angle of each plane, with the effects' curve."""
+        """Residual after bias, scale, misalignment, delay and position, over the angle of each plane, with the effects' curve."""
         if points.groupby("axis")["value"].nunique(dropna=True).min() < len(points) / 10:
             return None  # constant or clipped
         data = data_of(points)
@@ -179,15 +179,15 @@ class Rotation(InG, Evaluated):
         plots: list[Plot] = []
         for plane in part.planes:
             rows = points[points["axis"] == data.letters[0]].sort_values("time_s")
-            own = (rows["series"] == plane).to_numpy(dtype=bool) & data.points.turning
-            angle = np.degrees(data.points.angle[own])
+            turning = (rows["series"] == plane).to_numpy(dtype=bool) & data.points.turning
+            angle = np.degrees(data.points.angle[turning])
             order = np.argsort(angle)
             traces = [level(np.array([-180.0, 180.0]), 0.0)]
             for k, axis in enumerate(data.letters):
-                role, left = cast("Role", axis), (fit.residuals + curve)[own, k]
+                role, left = cast("Role", axis), (fit.residuals + curve)[turning, k]
                 traces += [
                     Trace(f"axis {axis}", angle, MICRO * left, role=role, size=4.0),
-                    Trace(f"effects on {axis}", angle[order], MICRO * curve[own, k][order], "line", role),
+                    Trace(f"effects on {axis}", angle[order], MICRO * curve[turning, k][order], "line", role),
                 ]
             plots.append(
                 Plot(f"plane {plane}", PlotAxis("angle / °", step=45.0), PlotAxis("residual / µg"), tuple(traces))
@@ -195,8 +195,8 @@ class Rotation(InG, Evaluated):
         return Chart(self.title, tuple(plots))
 
 
-def _figure(name: str, axis: str, one: tuple[float, float], factor: float, nominal: float = 0.0) -> FigureValue:
-    return FigureValue(name, axis, factor * (one[0] - nominal), factor * one[1])
+def _figure(name: str, axis: str, estimate: tuple[float, float], factor: float, nominal: float = 0.0) -> FigureValue:
+    return FigureValue(name, axis, factor * (estimate[0] - nominal), factor * estimate[1])
 
 
 def _misalignment(fit: RotationFit, axis: str, other: str) -> FigureValue:
@@ -213,12 +213,12 @@ def _effect(figure: str, effect: str, fit: RotationFit, axis: str) -> FigureValu
 
 
 def _felt(fit: RotationFit) -> list[str]:
-    """Directions in which the test shows the place of the proof masses, not only what is possible."""
+    """Directions in which the test determines the position of the proof masses better than their stated range."""
     return [a for a in "xyz" if fit.of(f"place_{a}")[1] < 0.5 * PLACE_M]
 
 
 def _response(data: RotationData, fit: RotationFit) -> FigureValue:
-    """Of the model with such a gain, whether or not the model that is judged has it."""
+    """Gain of the response to rotation, from the model with that effect, whether or not the judged model has it."""
     model = data.model
     if not model.seen(GAIN):
         return FigureValue.not_determined(
@@ -240,8 +240,8 @@ def _radius(fit: RotationFit) -> FigureValue:
 
 
 def _coefficients(fit: RotationFit, letters: tuple[str, ...]) -> Texts:
-    def stated(one: tuple[float, float], factor: float, nominal: float = 0.0) -> str:
-        return with_uncertainty(factor * (one[0] - nominal), 2.0 * factor * one[1])
+    def stated(estimate: tuple[float, float], factor: float, nominal: float = 0.0) -> str:
+        return with_uncertainty(factor * (estimate[0] - nominal), 2.0 * factor * estimate[1])
 
     out: list[tuple[str, str]] = []
     for a in letters:
@@ -252,15 +252,15 @@ def _coefficients(fit: RotationFit, letters: tuple[str, ...]) -> Texts:
         parts += [f"to {b} {stated(fit.of(f'matrix_{a}{b}'), MILLI)} mg/g" for b in AXES if b != a]
         for effect in fit.effects:
             if f"{effect}_{a}" in fit.names:
-                one = EFFECTS[effect]
-                parts.append(f"{effect} {stated(fit.of(f'{effect}_{a}'), one.factor)} {one.unit}")
+                shown = EFFECTS[effect]
+                parts.append(f"{effect} {stated(fit.of(f'{effect}_{a}'), shown.factor)} {shown.unit}")
         out.append((f"coefficients of axis {a}", f"{'; '.join(parts)} (k = 2)"))
-    place = ", ".join(f"{a} {stated(fit.of(f'place_{a}'), MILLI)} mm" for a in _felt(fit))
-    return [*out, ("place of the proof masses in the fixture", f"{place} (k = 2)")]
+    places = ", ".join(f"{a} {stated(fit.of(f'place_{a}'), MILLI)} mm" for a in _felt(fit))
+    return [*out, ("place of the proof masses in the fixture", f"{places} (k = 2)")]
 
 
 def _drive(part: RotationPart, rows: pd.DataFrame) -> Texts:
-    """How steady the drive was, and what its readings cost."""
+    """Steadiness of the drive's rate, and the uncertainty of the angle by its readings."""
     turning = rows[(rows["sweep"] >= 0) & (rows["axis"] == rows["axis"].iloc[0])]
     departure = turning.groupby("sweep")["rate_deg_s"].agg(lambda r: float((r / r.mean() - 1.0).std())).max()
     angle = np.sqrt((turning[[f"angle_{k}_deg" for k in range(6)]].to_numpy(dtype=float) ** 2).sum(axis=1).max())
@@ -286,9 +286,9 @@ def _open(part: RotationPart) -> Texts:
 
 def _diagnosis(diagnosis: RotationDiagnosis) -> Texts:
     def size(name: str) -> str:
-        fit, one = diagnosis.extended, EFFECTS[name]
-        found = max((fit.of(own) for own in fit.of_effect(name)), key=lambda pair: abs(pair[0]))
-        return f"up to {with_uncertainty(one.factor * found[0], 2.0 * one.factor * found[1])} {one.unit} (k = 2)"
+        fit, shown = diagnosis.extended, EFFECTS[name]
+        found = max((fit.of(term) for term in fit.of_effect(name)), key=lambda pair: abs(pair[0]))
+        return f"up to {with_uncertainty(shown.factor * found[0], 2.0 * shown.factor * found[1])} {shown.unit} (k = 2)"
 
     rms = (f"{MICRO * diagnosis.error_g:.3g}", f"{MICRO * diagnosis.extended_g:.3g}", "µg")
     first = ("bias", "scale", "misalignment", "delay", "place")

@@ -79,23 +79,23 @@ def points_of_record(
     readings = record.samples[REFERENCE]
     ends = np.radians([_angle(record, 0), *(turn.to_deg for turn in record.step.turns)])
     sweeps, still = parts_of(readings.time, np.radians(readings.output[:, 0]), ends.tolist(), part.turns, part.stand_s)
-    for one in units:
-        yield from _points(part, number, one, sweeps, still, device)
+    for unit in units:
+        yield from _points(part, number, unit, sweeps, still, device)
 
 
 def _angle(record: ProcedureRecord, which: int) -> float:
     """Commanded angle of the axis that turns (0), or of the other one (1), where the record begins."""
     outer, inner = record.step.pose.outer_deg, record.step.pose.inner_deg
-    own = (outer, inner) if record.step.turns[0].axis == "outer" else (inner, outer)
-    return own[which]
+    angles = (outer, inner) if record.step.turns[0].axis == "outer" else (inner, outer)
+    return angles[which]
 
 
 def _points(
     part: RotationPart, number: int, taken: Taken, sweeps: Sequence[Sweep], still: Array, device: Device
 ) -> list[dict[str, Any]]:
-    time, letters = taken.own.time, taken.own.letters
-    output = taken.own.output / scale_of(part, device, taken.unit)[: len(letters)]
-    clipped = device.at_end(taken.own.output) > 0
+    time, letters = taken.samples.time, taken.samples.letters
+    output = taken.samples.output / scale_of(part, device, taken.unit)[: len(letters)]
+    clipped = device.at_end(taken.samples.output) > 0
     turned, plane = taken.record.step.turns[0].axis == "inner", taken.record.step.name
     other = float(taken.reading["outer_deg" if turned else "inner_deg"])
     spread = _white([output[(time >= s.begin) & (time < s.end)] for s in sweeps])
@@ -104,12 +104,12 @@ def _points(
     def add(
         where: Places, angle: Array, span: float, motion: tuple[float, float], sweep: int, uncertain: Array
     ) -> None:
-        own = float(np.degrees(angle.mean()))
-        common = (other, own, 1.0) if turned else (own, other, 0.0)
+        turned_to = float(np.degrees(angle.mean()))
+        common = (other, turned_to, 1.0) if turned else (turned_to, other, 0.0)
         steady = np.degrees([span, *motion]).tolist()
         rows.extend(
             point_rows(
-                unit=taken.unit, axis=letters, series=plane, point=1000 * number + len(rows) // len(letters), setting=own,
+                unit=taken.unit, axis=letters, series=plane, point=1000 * number + len(rows) // len(letters), setting=turned_to,
                 value=np.full(len(letters), np.nan) if clipped else output[where].mean(axis=0),
                 uncertainty=spread / np.sqrt(len(where)), time_s=float(time[where].mean()), sweep=float(sweep),
                 **dict(zip(COMMON, (*common, *steady), strict=True)),
@@ -123,20 +123,20 @@ def _points(
             add(where, np.array([angle]), 0.0, (0.0, 0.0), -1, np.zeros(len(UNCERTAIN)))
         if k == len(sweeps):
             break
-        own = sweeps[k]
-        inside = np.flatnonzero((time >= own.begin) & (time < own.end))
-        angles, (rates, accelerations) = own.angle(time[inside]), own.motion(time[inside])
-        way = np.abs(angles - own.angle(np.array([own.begin])))
-        places = np.minimum((way * BINS / (2.0 * np.pi)).astype(int), BINS * part.turns - 1)
-        for place in range(BINS * part.turns):
-            pick = np.flatnonzero(places == place)
+        turn = sweeps[k]
+        inside = np.flatnonzero((time >= turn.begin) & (time < turn.end))
+        angles, (rates, accelerations) = turn.angle(time[inside]), turn.motion(time[inside])
+        way = np.abs(angles - turn.angle(np.array([turn.begin])))
+        sectors = np.minimum((way * BINS / (2.0 * np.pi)).astype(int), BINS * part.turns - 1)
+        for sector in range(BINS * part.turns):
+            pick = np.flatnonzero(sectors == sector)
             if pick.size < FEWEST_SAMPLES:
                 text = f"{pick.size} samples in {360.0 / BINS:g}°, {FEWEST_SAMPLES} are needed"
                 raise NotIdentified(f"rotation: {text}; turn more slowly, or raise rate_hz")
             # of evenly spaced angles the standard deviation is that of a span, whose mean the model takes
             span = float(np.sqrt(12.0) * angles[pick].std())
             motion = float(rates[pick].mean()), float(accelerations[pick].mean())
-            uncertain = own.uncertain(time[inside[pick]]).mean(axis=0)
+            uncertain = turn.uncertain(time[inside[pick]]).mean(axis=0)
             add(inside[pick], angles[pick], span, motion, len(sweeps) * number + k, uncertain)
     return rows
 
@@ -158,11 +158,11 @@ def data_of(rows: pd.DataFrame) -> RotationData:
     letters = axes_among(rows["axis"])
     by_axis = [rows[rows["axis"] == axis].sort_values("time_s") for axis in letters]
     values, errors = (
-        np.column_stack([own[name].to_numpy(dtype=float) for own in by_axis]) for name in ("value", "uncertainty")
+        np.column_stack([rows[name].to_numpy(dtype=float) for rows in by_axis]) for name in ("value", "uncertainty")
     )
     if not np.all(np.isfinite(values)):
         raise NotIdentified("the output reaches the end of its range; choose a wider one")
-    if still := [axis for axis, own in zip(letters, values.T, strict=True) if np.ptp(own) == 0.0]:
+    if still := [axis for axis, output in zip(letters, values.T, strict=True) if np.ptp(output) == 0.0]:
         raise NotIdentified(f"the output of axis {' and '.join(still)} is constant; check the unit")
 
     def of(*names: str) -> Array:

@@ -129,9 +129,11 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         return [before, *shocks, after]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One shock."""
-        one = step.setting
-        return equipment.shock(one["peak_g"], one["duration_s"], int(one["axis"]), int(one["direction"]), slots)
+        """The recording of one shock."""
+        setting = step.setting
+        return equipment.shock(
+            setting["peak_g"], setting["duration_s"], int(setting["axis"]), int(setting["direction"]), slots
+        )
 
     def setting_of(self, part: ShockPart, reference: UnitRecord) -> dict[str, float]:
         """Peak and direction of a shock, from the reference."""
@@ -150,38 +152,38 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         if "duration_ms" in stated and not 1.0 / TOO_FAR < part.duration_ms / duration < TOO_FAR:
             msg = f"duration_ms is {part.duration_ms:g}, the pulse lasts {duration:.3g} ms; correct it, or leave it out"
             raise NotIdentified(msg)
-        own = {"duration_ms": duration, "before_ms": before}
-        return part.model_copy(update={name: value for name, value in own.items() if name not in stated})
+        recorded = {"duration_ms": duration, "before_ms": before}
+        return part.model_copy(update={name: value for name, value in recorded.items() if name not in stated})
 
     def reduce(self, part: ShockPart, records: Records, device: Device) -> pd.DataFrame:
         """Peaks of reference and unit, waveforms and spectra of the first shock, and the bias before and after."""
         rows: list[dict[str, Any]] = []
         axis, duration, before_s = AXES.index(part.axis), 1e-3 * part.duration_ms, 1e-3 * part.before_ms
         first = next((k for k, record in enumerate(records) if record.step.role), -1)
-        for one in taken(records):
-            scale = scale_of(part, device, one.unit)
-            if not one.record.step.role:
-                rows += bias_points(one, scale)
+        for measured in taken(records):
+            scale = scale_of(part, device, measured.unit)
+            if not measured.record.step.role:
+                rows += bias_points(measured, scale)
                 continue
-            direction = one.record.step.setting["direction"]
-            alone = REFERENCE not in one.record.samples
-            in_g = UnitRecord(one.own.time, one.own.output / scale)
-            drive = in_g if alone else one.record.samples[REFERENCE]
-            end_s, earlier, others = shock_records.single_pulse(one.number, drive, axis, duration)
-            own, drive = (shock_records.until(wave, end_s) for wave in (one.own, drive))
-            pair = shock_records.filtered_pair(drive, own, axis, scale[axis], duration)
-            lone_s = shock_records.lone_sample([own] if alone else [own, drive], axis, duration)
+            direction = measured.record.step.setting["direction"]
+            alone = REFERENCE not in measured.record.samples
+            in_g = UnitRecord(measured.samples.time, measured.samples.output / scale)
+            drive = in_g if alone else measured.record.samples[REFERENCE]
+            end_s, earlier, others = shock_records.single_pulse(measured.number, drive, axis, duration)
+            answer, drive = (shock_records.until(wave, end_s) for wave in (measured.samples, drive))
+            pair = shock_records.filtered_pair(drive, answer, axis, scale[axis], duration)
+            lone_s = shock_records.lone_sample([answer] if alone else [answer, drive], axis, duration)
             found = shock_records.Found(alone, lone_s, earlier)
             of_shock = others + shock_records.rows_of(
-                one.number, direction, (own, drive), axis, pair, (before_s, duration), device, found
+                measured.number, direction, (answer, drive), axis, pair, (before_s, duration), device, found
             )
             names = ("unit",) if alone else ("reference", "unit")
             if not alone:
                 noise = shock_records.noise_before(pair, before_s)
-                of_shock += shock_records.waves(one.number, pair, direction, part, noise)
-            if one.number == first:
+                of_shock += shock_records.waves(measured.number, pair, direction, part, noise)
+            if measured.number == first:
                 of_shock += shock_records.curves(pair, names, duration, before_s)
-            rows += [row | {"unit": one.unit, "axis": part.axis} for row in of_shock]
+            rows += [row | {"unit": measured.unit, "axis": part.axis} for row in of_shock]
         return point_table(rows)
 
     def of_unit(self, part: ShockPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
@@ -215,10 +217,10 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         shown: dict[str, list[Trace]] = {"wave": [], "spectrum": []}
         for series, factor in (("wave", 1e3), ("spectrum", 1.0)):
             for name, role, width in (("reference", "before", 3.2), ("unit", "after", 1.1)):
-                own = points[points["series"] == f"{series}_{name}"]
-                if own.empty:  # recorded without a reference
+                shock = points[points["series"] == f"{series}_{name}"]
+                if shock.empty:  # recorded without a reference
                     continue
-                x, y = numbers(own, "setting", "value")
+                x, y = numbers(shock, "setting", "value")
                 shown[series].append(Trace(name, factor * x, y, "line", cast("Role", role), width=width))
         left = Plot("", PlotAxis("time / ms"), PlotAxis(f"acceleration on {part.axis} / g"), tuple(shown["wave"]))
         axes = PlotAxis("natural frequency / Hz", log=True), PlotAxis("maximax response, Q = 10 / g")
@@ -230,21 +232,21 @@ def _setting(part: ShockPart, peak_g: float, direction: float) -> dict[str, floa
     return {"peak_g": peak_g, "duration_s": 1e-3 * part.duration_ms, "direction": direction, "axis": axis}
 
 
-def bias_points(one: Taken, scale: np.ndarray) -> list[dict[str, Any]]:
+def bias_points(measured: Taken, scale: np.ndarray) -> list[dict[str, Any]]:
     """Mean of every axis in µg, its uncertainty from the scatter of ten parts; ``setting`` is 0 before, 1 after."""
-    letters, rate = one.own.letters, one.own.rate_hz
-    output = one.own.output / scale[: len(letters)] * MICRO
+    letters, rate = measured.samples.letters, measured.samples.rate_hz
+    output = measured.samples.output / scale[: len(letters)] * MICRO
     noise = [noise_columns(short_noise(output[:, i], rate)) for i in range(len(letters))]
     return point_rows(
-        unit=one.unit,
+        unit=measured.unit,
         axis=letters,
         series="bias",
-        point=one.number,
-        setting=0.0 if one.record.step.name == "before" else 1.0,
+        point=measured.number,
+        setting=0.0 if measured.record.step.name == "before" else 1.0,
         value=[output[:, i].mean() for i in range(len(letters))],
         uncertainty=error_of_mean(output),
         window_s=len(output) / rate,
-        time_s=float(one.own.time.mean()),
+        time_s=float(measured.samples.time.mean()),
         **{name: [each[name] for each in noise] for name in noise[0]},
     )
 
@@ -256,8 +258,8 @@ def bias_shift(bias: pd.DataFrame) -> FigureValue:
     if len(bias):  # white noise and flicker of after minus before, pooled over the axes
         time = bias["time_s"].to_numpy(dtype=float) if "time_s" in bias else np.zeros(1)  # earlier versions have none
         pooled = difference_error(pooled_noise(bias), float(bias["window_s"].mean()), float(np.ptp(time)))
-    for axis, own in bias.groupby("axis", sort=False):
-        before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]
+    for axis, mean in bias.groupby("axis", sort=False):
+        before, after = mean[mean["setting"] == 0.0], mean[mean["setting"] > 0.0]
         if before.empty or after.empty:
             continue
         value = float(after["value"].iloc[0] - before["value"].iloc[0])
@@ -289,23 +291,25 @@ def compared_results(part: ShockPart, figures: Mapping[str, FigureValue], shocks
     if ratio is None:
         return []
     dof = float(shocks - 1) if shocks > 1 else float("inf")
-    whole = 100.0 + ratio.value
-    terms = by_share(whole, ("reference", "drift", "amplitude", "mounting"))
-    terms["transverse"] = 1e-2 * part.transverse_percent / np.sqrt(6.0) * whole
+    percent = 100.0 + ratio.value
+    terms = by_share(percent, ("reference", "drift", "amplitude", "mounting"))
+    terms["transverse"] = 1e-2 * part.transverse_percent / np.sqrt(6.0) * percent
     noise = {"noise": without(ratio.uncertainty, part.reference_percent)}
     results = [ComparedResult("shock_sensitivity", part.axis, "%", ratio.value, noise, terms, dof=dof)]
     for name in RELATIVE:
-        one = figures.get(name)
-        if one is not None:
+        figure = figures.get(name)
+        if figure is not None:
             quantity = name.rpartition("_")[0]
             results.append(
-                ComparedResult(quantity, one.axis, UNIT_OF[name], one.value, {"noise": one.uncertainty}, dof=dof)
+                ComparedResult(
+                    quantity, figure.axis, UNIT_OF[name], figure.value, {"noise": figure.uncertainty}, dof=dof
+                )
             )
     shift = figures.get("shock_bias_shift_ug")
     if shift is not None:
         scale = 1e-2 * abs(shift.value) * float(np.hypot(ratio.value, ratio.uncertainty))
-        own = {"noise": shift.uncertainty, "nominal_scale": scale}
-        results.append(ComparedResult("shock_bias_shift", shift.axis, "µg", shift.value, own))
+        shift_terms = {"noise": shift.uncertainty, "nominal_scale": scale}
+        results.append(ComparedResult("shock_bias_shift", shift.axis, "µg", shift.value, shift_terms))
     return results
 
 

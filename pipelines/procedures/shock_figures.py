@@ -32,12 +32,12 @@ CLIPS = ("", "the output", "the reference")
 
 def texts_of(reference: pd.DataFrame, pulse: pd.DataFrame, others: pd.DataFrame) -> list[tuple[str, str]]:
     """Peak, duration and velocity change of the reference, or of the unit where it was recorded alone; other pulses."""
-    own, name = (reference, "reference") if len(reference) else (pulse, "unit")
-    if own.empty:
+    shocks, name = (reference, "reference") if len(reference) else (pulse, "unit")
+    if shocks.empty:
         return []
-    peak, lasting = float(own["value"].abs().mean()), float(own["duration_s"].mean())
+    peak, lasting = float(shocks["value"].abs().mean()), float(shocks["duration_s"].mean())
     text = (
-        f"{name} {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change {float(own['velocity_m_s'].abs().mean()):.3g} m/s "
+        f"{name} {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change {float(shocks['velocity_m_s'].abs().mean()):.3g} m/s "
         f"(half sine: {pulses.velocity_change(peak, lasting):.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
     )
     of_others = numbers(others, "setting", "value", "shock") if len(others) else ([], [], [])
@@ -97,7 +97,7 @@ def ratio_figures(part: Any, ratio: pd.DataFrame, good: pd.DataFrame, apart: str
 
 
 def _without(ratio: pd.DataFrame, good: int) -> str:
-    """Why there is no comparison; empty where every shock has one."""
+    """Why there is no comparison; empty where every shock was compared."""
     if ratio.empty:
         return "0 of 0 shocks show no pulse; check cable and mounting"
     clipped = int((ratio["clipped"] > 0.0).sum())

@@ -29,10 +29,10 @@ LEAD, TAIL = 1.5, 6.0  # durations before and after the pulse that are compared
 Pair = tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]
 
 
-def filtered_pair(reference: UnitRecord, own: UnitRecord, axis: int, scale: float, duration_s: float) -> Pair:
+def filtered_pair(reference: UnitRecord, unit: UnitRecord, axis: int, scale: float, duration_s: float) -> Pair:
     """Reference and unit along an axis in g, each through the same phaseless low-pass, with their rates."""
-    first, second = reference.output[:, axis], own.output[:, axis] / scale
-    rate, unit_rate = reference.rate_hz, own.rate_hz
+    first, second = reference.output[:, axis], unit.output[:, axis] / scale
+    rate, unit_rate = reference.rate_hz, unit.rate_hz
     return (pulses.low_passed(first, rate, duration_s), rate), (
         pulses.low_passed(second, unit_rate, duration_s),
         unit_rate,
@@ -58,10 +58,10 @@ def waves(number: int, pair: Pair, direction: float, part: Any, noise_g: float) 
     for wave, rate in pair:
         time = np.arange(wave.size) / rate
         both.append((time, CubicSpline(time, wave - wave[: int(before_s * rate)].mean())))
-    (time, reference), (own, unit) = both
+    (time, reference), (unit_time, unit) = both
     peak = float(time[int(np.argmax(np.abs(reference(time))))])
     first = max(peak - (0.5 + LEAD) * duration, 0.0)
-    last = min(peak + (0.5 + TAIL) * duration, time[-1], own[-1])
+    last = min(peak + (0.5 + TAIL) * duration, time[-1], unit_time[-1])
     at = np.arange(first, last, duration / PER_PULSE)
     top = float(np.max(np.abs(reference(at))))
     error = float(np.hypot(noise_g, 1e-2 * part.waveform_percent * top))
@@ -86,16 +86,17 @@ def until(record: UnitRecord, end_s: float) -> UnitRecord:
 def single_pulse(
     number: int, drive: UnitRecord, axis: int, duration: float
 ) -> tuple[float, bool, list[dict[str, Any]]]:
-    """Time before the pulse behind the largest, s, whether one is before the largest, and the rows of both.
+    """Time before the pulse behind the largest, s, whether a pulse is before the largest, and the rows of both.
 
-    A rebound behind the pulse is left out; one before it lies in the baseline of its figures.
+    A rebound behind the pulse is left out; a pulse before it lies in the baseline of its figures.
     """
     earlier, later = pulse_faults.other_pulses(drive.output[:, axis], drive.rate_hz, duration)
     rows = [
         {
-            "point": MOST_SAMPLES * number + k, "series": "other", "setting": one.at_s, "value": one.peak, "shock": float(number),
+            "point": MOST_SAMPLES * number + k, "series": "other", "setting": pulse.at_s, "value": pulse.peak,
+            "shock": float(number),
         }
-        for k, one in enumerate((*earlier, *later))
+        for k, pulse in enumerate((*earlier, *later))
     ]  # fmt: skip
     end_s = later[0].begins_s - 0.5 * duration if later else np.inf
     return end_s, bool(earlier), rows
@@ -104,9 +105,9 @@ def single_pulse(
 def lone_sample(records: Sequence[UnitRecord], axis: int, duration: float) -> float:
     """Time of the first sample of the records that departs alone, s from their begin; nan for none."""
     found = [
-        float(one.time[k] - one.time[0])
-        for one in records
-        for k in pulse_faults.lone_samples(one.output[:, axis], one.rate_hz, duration)[:1]
+        float(channel.time[k] - channel.time[0])
+        for channel in records
+        for k in pulse_faults.lone_samples(channel.output[:, axis], channel.rate_hz, duration)[:1]
     ]
     return min(found, default=np.nan)
 
@@ -125,20 +126,20 @@ _last_judged: dict[bytes, ShockDiagnosis] = {}
 
 
 def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
-    """The diagnosis of the first shock in each direction; None where no waveforms are kept."""
-    kept = rows[rows["series"] == "compared"]
+    """The diagnosis of the first shock in each direction; None where the points have no waveforms."""
+    waveforms = rows[rows["series"] == "compared"]
     shocks: list[Waves] = []
     duration = 1e-3 * part.duration_ms
     before, rate = 0.0, PER_PULSE / duration
-    for _, one in kept.groupby("direction", sort=False):
-        own = one[one["shock"] == one["shock"].iloc[0]]
-        reference, unit, error = numbers(own, "reference_g", "value", "uncertainty")
+    for _, shock in waveforms.groupby("direction", sort=False):
+        first = shock[shock["shock"] == shock["shock"].iloc[0]]
+        reference, unit, error = numbers(first, "reference_g", "value", "uncertainty")
         shocks.append(Waves(reference, unit, error))
-        before = -float(own["setting"].iloc[0])
+        before = -float(first["setting"].iloc[0])
     if not shocks:
         return None
     key = repr((part.effects, rate, duration, before)).encode()
-    key += b"".join(array.tobytes() for one in shocks for array in (one.reference, one.unit, one.error))
+    key += b"".join(array.tobytes() for shock in shocks for array in (shock.reference, shock.unit, shock.error))
     if key not in _last_judged:
         made = diagnose_shock(ShockRecord(rate, duration, before, tuple(shocks)), part.effects)
         _last_judged.clear()
@@ -147,7 +148,7 @@ def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
 
 
 def judged_curves(rows: pd.DataFrame, part: Any) -> list[JudgedCurve]:
-    """The model of the waveforms with its verdict, which a certificate rests on; none where no waveforms are kept."""
+    """The model of the waveforms with its verdict, which a certificate rests on; none where the points have no waveforms."""
     try:
         diagnosis = judged(rows, part)
     except NotIdentified as problem:
@@ -243,7 +244,7 @@ def rows_of(
     still = np.median(raw[: int(before_s * unit_rate)])
     # a rail of the unit itself, below the range of the data sheet, shows as an extreme at which it stands still
     clipped = device.at_end(raw) + device.at_end(raw - still) + at_extreme(raw)[2] > 0
-    flat = [_flat(one, axis, times) for one in channels[: 1 if alone else 2]]
+    flat = [_flat(channel, axis, times) for channel in channels[: 1 if alone else 2]]
     if len(set(flat)) > 1 or (alone and flat[0]):  # a machine may make a flat pulse, two channels do not clip alike
         clipped = shock_figures.CLIPS.index("the output" if flat[0] else "the reference")
     ratio = error = under = noise = np.nan

@@ -26,7 +26,7 @@ class StaticRecord(Procedure):
     part = StaticRecordPart
 
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
-        """One record."""
+        """A single record in one pose."""
         return [ProcedureStep("static", recipe.static_pose, recipe.static_temperature_C, "allan")]
 
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:

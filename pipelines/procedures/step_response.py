@@ -79,9 +79,9 @@ class StepResponse(OnEquipment, FromWaveforms):
         return [on_equipment("step_generator", name, part, lasting, setting, pose="step") for name in names]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """One step."""
-        one = step.setting
-        return equipment.step(one["volts"], one["hold_s"], one["before_s"], slots)
+        """The recording of one step of voltage."""
+        setting = step.setting
+        return equipment.step(setting["volts"], setting["hold_s"], setting["before_s"], slots)
 
     def setting_of(self, part: StepPart, reference: UnitRecord) -> dict[str, float]:
         """Voltage of the step, from the recorded drive."""
@@ -92,55 +92,58 @@ class StepResponse(OnEquipment, FromWaveforms):
         rows: list[dict[str, Any]] = []
         edges = [_edge(record.samples[REFERENCE]) for record in records]
         for unit in dict.fromkeys(str(name) for record in records for name in record.readings["unit"]):
-            own = [
+            recorded = [
                 (record.samples[unit], edge)
                 for record, edge in zip(records, edges, strict=True)
                 if unit in record.samples
             ]
-            for i, axis in enumerate(own[0][0].letters if own else ()):
-                rows += [one | {"unit": unit, "axis": axis} for one in _averaged(part, own, i, device)]
+            for i, axis in enumerate(recorded[0][0].letters if recorded else ()):
+                rows += [point | {"unit": unit, "axis": axis} for point in _averaged(part, recorded, i, device)]
         return point_table(rows)
 
     def of_unit(self, part: StepPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The figures of the worst axis."""
         values: list[list[FigureValue]] = []
         texts: list[tuple[str, str]] = []
-        for axis, own in rows.groupby("axis", sort=False):
+        for axis, response in rows.groupby("axis", sort=False):
             try:
-                one = axis_figures(part, own)
+                step = axis_figures(part, response)
             except NotIdentified as problem:
                 values.append(self.nothing(part, f"axis {axis}: {problem}", str(axis)))
                 continue
-            values.append(_values(part, str(axis), one))
+            values.append(_values(part, str(axis), step))
             texts.append(
-                (f"delay of axis {axis}", f"{1e3 * one.delay_s:.4g} ms from the edge of the drive to 50 % of the step")
+                (f"delay of axis {axis}", f"{1e3 * step.delay_s:.4g} ms from the edge of the drive to 50 % of the step")
             )
         return [worst(of_figure) for of_figure in zip(*values, strict=True)], texts
 
     def chart(self, part: StepPart, points: pd.DataFrame) -> Chart:
         """The response of every axis, and its last part about the final value with the band and the settling times."""
-        whole: list[Trace] = []
+        full: list[Trace] = []
         last: list[Trace] = []
         settled = float("nan")
         most = 5.0 * part.band_percent
         for axis, width in zip(axes_among(points["axis"]), WIDTHS, strict=False):
-            own = points[points["axis"] == axis].sort_values("setting")
-            time, value = 1e3 * own["setting"].to_numpy(dtype=float), 100.0 * own["value"].to_numpy(dtype=float)
-            whole.append(Trace(f"axis {axis}", time, value, "line", axis, width=width))
+            response = points[points["axis"] == axis].sort_values("setting")
+            time, value = (
+                1e3 * response["setting"].to_numpy(dtype=float),
+                100.0 * response["value"].to_numpy(dtype=float),
+            )
+            full.append(Trace(f"axis {axis}", time, value, "line", axis, width=width))
             last.append(Trace(f"axis {axis}", time, value - 100.0, "line", axis, width=width))
             try:
-                settled = 1e3 * axis_figures(part, own).settling_s
+                settled = 1e3 * axis_figures(part, response).settling_s
             except NotIdentified:
                 continue
             last.append(
                 Trace("", np.full(2, settled), np.array([-most, most]), "line", axis, dashed=True, legend=False)
             )
-        end = max(float(trace.x.max()) for trace in whole)
+        end = max(float(trace.x.max()) for trace in full)
         edges = ((-1.0 * settled, 5.0 * settled), (0.0, 4.0 * settled)) if np.isfinite(settled) else ((None, None),) * 2
         label = "time from the edge of the drive / ms"
         band = between(np.array([0.0, end]), -part.band_percent, part.band_percent, f"band ± {part.band_percent:g} %")
         left = Plot(
-            "", PlotAxis(label, low=edges[0][0], high=edges[0][1]), PlotAxis("response / % of the step"), (*whole,)
+            "", PlotAxis(label, low=edges[0][0], high=edges[0][1]), PlotAxis("response / % of the step"), (*full,)
         )
         right = Plot(
             "dashed: settling time",
@@ -160,15 +163,15 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
     """Figures of one axis from its averaged response."""
     if bool((rows["fault"] > 0.0).any()):
         raise NotIdentified(FAULTS[int(rows["fault"].iloc[0])])
-    kept = rows.sort_values("setting")
-    time, value, error = numbers(kept)
-    rate = float(kept["rate_hz"].iloc[0])
+    response = rows.sort_values("setting")
+    time, value, error = numbers(response)
+    rate = float(response["rate_hz"].iloc[0])
     figures = step_figures(
         time,
         value,
         error,
         band=1e-2 * part.band_percent,
-        edge_error_s=float(kept["edge_error_s"].iloc[0]),
+        edge_error_s=float(response["edge_error_s"].iloc[0]),
         bin_s=1.0 / rate / BINS,
     )
     samples = figures.rise_s * rate
@@ -204,46 +207,46 @@ def _edge(reference: UnitRecord) -> float:
 
 
 def _averaged(
-    part: StepPart, own: Sequence[tuple[UnitRecord, float]], axis: int, device: Device
+    part: StepPart, recorded: Sequence[tuple[UnitRecord, float]], axis: int, device: Device
 ) -> list[dict[str, Any]]:
     """The response of an axis as a share of its step, averaged over the steps in bins of time."""
-    hold, rate = 1e-3 * part.hold_ms, own[0][0].rate_hz
-    times = [np.arange(len(one.output)) / rate - edge for one, edge in own]
-    outputs = [one.output[:, axis] for one, _ in own]
+    hold, rate = 1e-3 * part.hold_ms, recorded[0][0].rate_hz
+    times = [np.arange(len(channel.output)) / rate - edge for channel, edge in recorded]
+    outputs = [channel.output[:, axis] for channel, _ in recorded]
     before = [output[time < -2.0 / rate] for time, output in zip(times, outputs, strict=True)]
     final = [
         output[(time > (1.0 - FINAL_SHARE) * hold) & (time < hold - 2.0 / rate)]
         for time, output in zip(times, outputs, strict=True)
     ]
-    base, size = np.array([one.mean() for one in before]), np.array([one.mean() for one in final])
+    base, size = np.array([output.mean() for output in before]), np.array([output.mean() for output in final])
     step = float(np.mean(size - base))
-    noise = float(np.sqrt(np.mean([one.var(ddof=1) for one in before])))
+    noise = float(np.sqrt(np.mean([output.var(ddof=1) for output in before])))
     fault = 0
     beyond = [np.sign(step) * (output - end) for output, end in zip(outputs, size, strict=True)]
-    at_end = max(float(np.max(np.abs(one))) for one in outputs) >= device.full_scale
-    if at_end or any(_cut_off(one, rate, noise) for one in beyond):
+    at_end = max(float(np.max(np.abs(output))) for output in outputs) >= device.full_scale
+    if at_end or any(_cut_off(excess, rate, noise) for excess in beyond):
         fault = 2
     elif not abs(step) > 10.0 * noise / np.sqrt(len(final[0])) or noise == 0.0:
         fault, step = 1, step or 1.0
-    elif any(lone_samples(one, rate, hold, 0.01 * part.band_percent).size for one in outputs):
+    elif any(lone_samples(output, rate, hold, 0.01 * part.band_percent).size for output in outputs):
         fault = 3
     shares = [(output - first) / step for output, first in zip(outputs, base, strict=True)]
     time = np.concatenate(times if fault else aligned(times, shares))
     share = np.concatenate(shares)
     inside = (time >= -0.5 * BEFORE_SHARE * hold) & (time < hold - 2.0 / rate)
     time, share = time[inside], share[inside]
-    place = np.floor(time * rate * BINS).astype(int)
-    place -= place.min()
-    count = np.bincount(place)
+    bins = np.floor(time * rate * BINS).astype(int)
+    bins -= bins.min()
+    count = np.bincount(bins)
     there = count > 0
-    middle, value = (np.bincount(place, weights=one)[there] / count[there] for one in (time, share))
+    middle, value = (np.bincount(bins, weights=weights)[there] / count[there] for weights in (time, share))
     return point_rows(
         series="response",
         point=np.arange(middle.size),
         setting=middle,
         value=value,
         uncertainty=np.maximum(noise / abs(step) / np.sqrt(count[there]), 1e-12),
-        edge_error_s=1.0 / rate / np.sqrt(12.0 * len(own)),
+        edge_error_s=1.0 / rate / np.sqrt(12.0 * len(recorded)),
         rate_hz=rate,
         fault=float(fault),
         step=step,
@@ -261,11 +264,11 @@ def _cut_off(beyond: Array, rate: float, noise: float) -> bool:
     return flat_top(lobe, rate, (high - low + 1) / rate, noise, 0.0) > 0
 
 
-def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:
+def _values(part: StepPart, axis: str, found: StepFigures) -> list[FigureValue]:
     value, spread, low, high = (
-        1e3 * s for s in (one.settling_s, one.settling_error_s, one.settling_low_s, one.settling_high_s)
+        1e3 * s for s in (found.settling_s, found.settling_error_s, found.settling_low_s, found.settling_high_s)
     )
-    if one.settling_identified:
+    if found.settling_identified:
         settling = FigureValue(SETTLING, axis, value, spread, value - 1.96 * spread, value + 1.96 * spread)
     else:
         note = (
@@ -275,8 +278,8 @@ def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:
         settling = FigureValue(SETTLING, axis, value, spread, low, high, identified=False, note=note)
     return [
         settling,
-        FigureValue(OVERSHOOT, axis, 100.0 * one.overshoot, 100.0 * one.overshoot_error),
-        FigureValue(RISE, axis, 1e3 * one.rise_s, 1e3 * one.rise_error_s),
+        FigureValue(OVERSHOOT, axis, 100.0 * found.overshoot, 100.0 * found.overshoot_error),
+        FigureValue(RISE, axis, 1e3 * found.rise_s, 1e3 * found.rise_error_s),
     ]
 
 

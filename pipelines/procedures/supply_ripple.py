@@ -88,7 +88,10 @@ class SupplyRipple(SetsEquipment, InG, RecordByRecord):
                 on_table=True,
                 setting={"ripple_V": volt, "frequency_hz": hertz},
             )
-            for volt, hertz in ((0.0, part.frequencies_hz[0]), *((part.ripple_V, one) for one in part.frequencies_hz))
+            for volt, hertz in (
+                (0.0, part.frequencies_hz[0]),
+                *((part.ripple_V, hertz) for hertz in part.frequencies_hz),
+            )
         ]
 
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
@@ -124,10 +127,10 @@ class SupplyRipple(SetsEquipment, InG, RecordByRecord):
     def points(self, part: SupplyRipplePart, taken: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Amplitude of the line at the frequency in the unit of the output; of the record without ripple at every frequency."""
         setting = taken.record.step.setting
-        output = taken.own.output[:, AXES.index(part.axis)]
+        output = taken.samples.output[:, AXES.index(part.axis)]
         quiet = setting["ripple_V"] == 0.0
         for k, hertz in enumerate(part.frequencies_hz if quiet else [setting["frequency_hz"]]):
-            line = ripple_line(output, taken.own.rate_hz, hertz)
+            line = ripple_line(output, taken.samples.rate_hz, hertz)
             yield {
                 "unit": taken.unit, "axis": part.axis, "series": "quiet" if quiet else "ripple", "point": taken.number + k,
                 "setting": hertz, "value": line.amplitude, "uncertainty": line.error, "ripple_V": setting["ripple_V"],
@@ -156,7 +159,7 @@ class SupplyRipple(SetsEquipment, InG, RecordByRecord):
         at, there, noise = numbers(quiet)
         hum = there > STANDS_OUT * noise
         if hum.any():
-            lines = ", ".join(f"{one:g} Hz" for one in at[hum])
+            lines = ", ".join(f"{hertz:g} Hz" for hertz in at[hum])
             texts.append(
                 ("without ripple", f"a line is there at {lines} without ripple, too: choose other frequencies")
             )
@@ -166,8 +169,8 @@ class SupplyRipple(SetsEquipment, InG, RecordByRecord):
         """The line in the output over the frequency, with and without ripple."""
         traces: list[Trace] = []
         for series, name in (("ripple", "with ripple, U (k = 2)"), ("quiet", "without")):
-            own = points[points["series"] == series]
-            frequency, value, error, scale = numbers(own, "setting", "value", "uncertainty", "scale")
+            lines = points[points["series"] == series]
+            frequency, value, error, scale = numbers(lines, "setting", "value", "uncertainty", "scale")
             traces.append(Trace(name, frequency, MICRO * value / scale, error=2.0 * MICRO * error / scale))
         axes = PlotAxis("frequency of the ripple / Hz", log=True), PlotAxis("line in the output / µg")
         return Chart(self.title, (Plot("", *axes, tuple(traces)),))

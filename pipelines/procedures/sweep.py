@@ -96,11 +96,11 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         ]
         steps = list(dwells)
         for soak, at in enumerate(part.other_temperatures_C, start=1):
-            steps += [replace(one, name=f"{at:g} °C, {one.name}", temperature_C=at, soak=soak) for one in dwells]
+            steps += [replace(dwell, name=f"{at:g} °C, {dwell.name}", temperature_C=at, soak=soak) for dwell in dwells]
         for pressure in part.pressures_hPa:
             steps.append(leg_step(f"{pressure:g} hPa", _leg(part, pressure), steps[-1].soak + 1))
             soak = steps[-1].soak + 1
-            steps += [replace(one, name=f"{pressure:g} hPa, {one.name}", soak=soak) for one in dwells]
+            steps += [replace(dwell, name=f"{pressure:g} hPa, {dwell.name}", soak=soak) for dwell in dwells]
         if part.pressures_hPa:
             steps.append(leg_step("room", _leg(part, AMBIENT_HPA), steps[-1].soak + 1))
         return steps
@@ -130,9 +130,9 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         """The dwell on the exciter."""
         if step.role == ROLE:
             return expose(equipment, step, slots)
-        one = step.setting
+        setting = step.setting
         seconds = step.lasting_s or 0.0
-        return equipment.sine(one["frequency_hz"], one["level_g"], int(one["axis"]), seconds, slots)
+        return equipment.sine(setting["frequency_hz"], setting["level_g"], int(setting["axis"]), seconds, slots)
 
     def setting_of(self, part: SweepPart, reference: UnitRecord) -> dict[str, float]:
         """Frequency and level of a dwell, from the largest tone of the reference; no frequency where there is no single tone."""
@@ -140,8 +140,8 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         wave = reference.output[:, [axis]] - reference.output[:, axis].mean()
         spectrum = np.abs(np.fft.rfft(wave[:, 0] * np.hanning(len(wave))))
         line = int(np.argmax(spectrum[1:])) + 1
-        tone_power, whole = np.sum(spectrum[max(line - 2, 1) : line + 3] ** 2), np.sum(spectrum[1:] ** 2)
-        if tone_power < SINGLE_TONE * whole:
+        tone_power, power = np.sum(spectrum[max(line - 2, 1) : line + 3] ** 2), np.sum(spectrum[1:] ** 2)
+        if tone_power < SINGLE_TONE * power:
             return {"frequency_hz": np.nan, "level_g": float(np.std(wave)), "axis": float(axis)}
         coarse = float(line) * reference.rate_hz / len(wave)
         tone = fit_tone_and_frequency(wave, reference.rate_hz, coarse)
@@ -159,51 +159,55 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         broadband = {id(r) for r in records if np.isnan(r.step.setting["frequency_hz"])}
         clocks = clocks_of([r for r in records if id(r) not in broadband], axis)
         rows: list[dict[str, Any]] = []
-        for one in taken(records):
-            clock, pair = clocks.get(one.unit, (0.0, 0.0)), (one.record.samples[REFERENCE], one.own)
-            if id(one.record) in broadband:
-                points = response_bands(part, one.number, pair, axis, device)
+        for measured in taken(records):
+            clock, pair = clocks.get(measured.unit, (0.0, 0.0)), (measured.record.samples[REFERENCE], measured.samples)
+            if id(measured.record) in broadband:
+                points = response_bands(part, measured.number, pair, axis, device)
             else:
-                points = [response_point(part, one.number, one.record.step.setting, pair, axis, clock, device)]
-            about = {"unit": one.unit, "temperature_C": float(one.reading["unit_C"])}
+                points = [
+                    response_point(part, measured.number, measured.record.step.setting, pair, axis, clock, device)
+                ]
+            about = {"unit": measured.unit, "temperature_C": float(measured.reading["unit_C"])}
             if part.pressures_hPa:
-                about["pressure_hPa"] = pressures[one.record.number]
+                about["pressure_hPa"] = pressures[measured.record.number]
             rows += [point | about for point in points]
         return point_table(rows)
 
     def of_unit(self, part: SweepPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The model, judged; figures of the adequate model, or as not determined with the reason."""
-        kept = rows[np.isfinite(rows["value"])]
+        measured = rows[np.isfinite(rows["value"])]
         texts: list[tuple[str, str]] = []
-        if len(kept) < len(rows):
-            text = f"{len(rows) - len(kept)} of {len(rows)} points give no tone, or are clipped: they are left out"
+        if len(measured) < len(rows):
+            text = f"{len(rows) - len(measured)} of {len(rows)} points give no tone, or are clipped: they are left out"
             texts.append(("points without a value", text))
-        if len(kept) < max(FEWEST_POINTS, 0.8 * len(rows)):
-            note = f"{len(kept)} of {len(rows)} points have a value, four fifths are needed; check cable and range"
+        if len(measured) < max(FEWEST_POINTS, 0.8 * len(rows)):
+            note = f"{len(measured)} of {len(rows)} points have a value, four fifths are needed; check cable and range"
             return self.nothing(part, note), texts
         try:
-            diagnosis = judged(part, kept)
+            diagnosis = judged(part, measured)
         except NotIdentified as problem:
             return self.nothing(part, str(problem)), texts
-        figures = figures_of_transfer(part, diagnosis, transfer_points(kept), device.scale.get(unit))
-        texts += [*diagnosis_text(diagnosis), *condition_texts(kept)]
+        figures = figures_of_transfer(part, diagnosis, transfer_points(measured), device.scale.get(unit))
+        texts += [*diagnosis_text(diagnosis), *condition_texts(measured)]
         band = next(figure for figure in figures if figure.figure == "sweep_bandwidth_hz")
         if band.identified:
-            texts.append(("sampling", sampling_text(float(kept["rate_hz"].max()), band.value, part.bandwidth_order)))
+            texts.append(
+                ("sampling", sampling_text(float(measured["rate_hz"].max()), band.value, part.bandwidth_order))
+            )
         return figures, texts
 
     def compared(
         self, part: SweepPart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
     ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
         """Magnitude and phase at every point, and the judged model through them."""
-        kept = rows[np.isfinite(rows["value"])]
-        if len(kept) < max(FEWEST_POINTS, 0.8 * len(rows)):
+        measured = rows[np.isfinite(rows["value"])]
+        if len(measured) < max(FEWEST_POINTS, 0.8 * len(rows)):
             return [], []
         try:
-            diagnosis = judged(part, kept)
+            diagnosis = judged(part, measured)
         except NotIdentified:
             return [], []
-        return transfer_results(part, diagnosis, kept, out_unit)
+        return transfer_results(part, diagnosis, measured, out_unit)
 
     def verdict(self, part: SweepPart, rows: pd.DataFrame) -> str:
         """The verdict on the model of the transfer function."""
@@ -212,10 +216,12 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
 
     def chart(self, part: SweepPart, points: pd.DataFrame) -> Chart | None:
         """Magnitude with uncertainty, phase, coherence, and the residual of the model."""
-        kept = points[np.isfinite(points["value"])]
-        if len(kept) < FEWEST_POINTS:
+        measured = points[np.isfinite(points["value"])]
+        if len(measured) < FEWEST_POINTS:
             return None
-        return bode_chart(transfer_points(kept), judged(part, kept), kept["coherence"].to_numpy(dtype=float))
+        return bode_chart(
+            transfer_points(measured), judged(part, measured), measured["coherence"].to_numpy(dtype=float)
+        )
 
 
 def judged(part: SweepPart, rows: pd.DataFrame) -> TransferDiagnosis:

@@ -92,13 +92,13 @@ def clocks_of(records: Sequence[ProcedureRecord], axis: int) -> dict[str, tuple[
     departures: dict[str, list[tuple[float, float]]] = {}
     for record in records:
         frequency = record.step.setting["frequency_hz"]
-        for unit, own in record.samples.items():
+        for unit, channel in record.samples.items():
             if unit == REFERENCE:
                 continue
-            y = own.output[:, axis : axis + 1]
+            y = channel.output[:, axis : axis + 1]
             if not np.all(np.isfinite(y)) or float(np.ptp(y)) == 0.0:
                 continue
-            tone = fit_tone_and_frequency(y, own.rate_hz, frequency, harmonics=HARMONICS)
+            tone = fit_tone_and_frequency(y, channel.rate_hz, frequency, harmonics=HARMONICS)
             if abs(tone.value[0]) > SILENT * tone.amplitude_error[0]:
                 departures.setdefault(unit, []).append(
                     (frequency / tone.frequency - 1.0, tone.frequency_error / frequency)
@@ -125,40 +125,42 @@ def response_point(
 
     Distortion of the exciter is not noise: it is fitted, and enters neither the uncertainty nor the coherence.
     """
-    reference, own = records
+    reference, answer = records
     frequency = setting["frequency_hz"]
     drive = fit_tone(reference.output, reference.rate_hz, frequency, harmonics=HARMONICS)
-    tone = fit_tone(own.output[:, axis : axis + 1], own.rate_hz, frequency / (1.0 + clock[0]), harmonics=HARMONICS)
+    tone = fit_tone(
+        answer.output[:, axis : axis + 1], answer.rate_hz, frequency / (1.0 + clock[0]), harmonics=HARMONICS
+    )
     ratio = tone.value[0] / drive.value[axis]
     size, level = abs(tone.value[0]), float(abs(drive.value[axis]))
     across = float(np.linalg.norm(np.abs(np.delete(drive.value, axis)))) / level
     noise = float(np.hypot(tone.amplitude_error[0] / max(size, 1e-300), drive.amplitude_error[axis] / level))
     transverse = 1e-2 * part.transverse_percent * across / np.sqrt(6.0)
-    skew = 2.0 * np.pi * frequency * clock[1] * len(own.output) / own.rate_hz / 2.0
+    skew = 2.0 * np.pi * frequency * clock[1] * len(answer.output) / answer.rate_hz / 2.0
     magnitude = float(np.sqrt(noise**2 + transverse**2 + (1e-2 * part.repeatability_percent) ** 2))
     phase = float(np.sqrt(noise**2 + transverse**2 + np.radians(part.repeatability_deg) ** 2 + skew**2))
     silent = size <= SILENT * tone.amplitude_error[0]  # an output of constant zero has neither tone nor noise
-    clipped = device.at_end(own.output[:, axis]) > 0
+    clipped = device.at_end(answer.output[:, axis]) > 0
     power = 0.5 * size**2
-    whole = not silent and not clipped and bool(np.isfinite(ratio))
+    valid = not silent and not clipped and bool(np.isfinite(ratio))
     return {
         "axis": part.axis,
         "series": "response",
         "point": number,
         "setting": frequency,
-        "value": float(abs(ratio)) if whole else np.nan,
-        "uncertainty": float(abs(ratio)) * magnitude if whole else np.nan,
-        "phase_deg": float(np.degrees(np.angle(ratio))) if whole else np.nan,
+        "value": float(abs(ratio)) if valid else np.nan,
+        "uncertainty": float(abs(ratio)) * magnitude if valid else np.nan,
+        "phase_deg": float(np.degrees(np.angle(ratio))) if valid else np.nan,
         "phase_uncertainty_deg": float(np.degrees(phase)),
         "level_g": level,
-        "record_s": len(own.output) / own.rate_hz,
+        "record_s": len(answer.output) / answer.rate_hz,
         "coherence": power / max(power + float(tone.sigma[0]) ** 2, 1e-300),
         "distortion_percent": 100.0
         * float(harmonic_distortion(reference.output[:, [axis]], reference.rate_hz, frequency)[0]),
         "transverse_percent": 100.0 * across,
         "clock_ppm": 1e6 * clock[0],
         "clock_uncertainty_ppm": 1e6 * clock[1],
-        "rate_hz": own.rate_hz,
+        "rate_hz": answer.rate_hz,
     }
 
 
@@ -172,28 +174,28 @@ def response_bands(
 ) -> list[dict[str, Any]]:
     """The points of a record of a swept sine, random vibration or an impact: bands of its whole spectrum.
 
-    A record of constant output, or one that is clipped, gives one point without a value.
+    A record whose output is constant or clipped gives a single point without a value.
 
     Parameters
     ----------
     part : of the recipe: axis, repeatability_percent, repeatability_deg
     clock : departure of the unit's clock from the reference's as a share, and its standard uncertainty
     """
-    reference, own = records
-    drive, wave = reference.output[:, axis], own.output[:, axis]
+    reference, answer = records
+    drive, wave = reference.output[:, axis], answer.output[:, axis]
     about = {
-        "axis": part.axis, "series": "response", "level_g": float(np.std(drive)), "record_s": len(wave) / own.rate_hz,
+        "axis": part.axis, "series": "response", "level_g": float(np.std(drive)), "record_s": len(wave) / answer.rate_hz,
         "distortion_percent": 0.0, "transverse_percent": 0.0, "clock_ppm": 1e6 * clock[0],
         "clock_uncertainty_ppm": 1e6 * clock[1],
-        "rate_hz": own.rate_hz,
+        "rate_hz": answer.rate_hz,
     }  # fmt: skip
     if float(np.ptp(wave)) == 0.0 or device.at_end(wave) > 0:
         return [about | {"point": POINTS_OF_RECORD * number, "setting": np.nan, "value": np.nan}]
-    late = float(own.time[0] - reference.time[0])
-    bands = frequency_response((drive, reference.rate_hz), (wave, own.rate_hz / (1.0 + clock[0])), late_s=late)
+    late = float(answer.time[0] - reference.time[0])
+    bands = frequency_response((drive, reference.rate_hz), (wave, answer.rate_hz / (1.0 + clock[0])), late_s=late)
     size = np.abs(bands.h1)
     magnitude = np.hypot(bands.error, 1e-2 * part.repeatability_percent)
-    skew = np.pi * bands.frequency * clock[1] * len(wave) / own.rate_hz
+    skew = np.pi * bands.frequency * clock[1] * len(wave) / answer.rate_hz
     phase = np.sqrt(bands.error**2 + np.radians(part.repeatability_deg) ** 2 + skew**2)
     rows = point_rows(
         **about,

@@ -77,22 +77,22 @@ class Tilt(RecordByRecord):
         ]
 
     def missing_axes(self, part: TiltPart, letters: Sequence[str]) -> list[str]:
-        """Both axes in the plane where the device has neither."""
+        """Both axes of the plane where the device has neither; else empty."""
         plane = _plane(part)
         return [] if any(axis in letters for axis in plane) else list(plane)
 
     def points(self, part: TiltPart, taken: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean output of every axis at an angle, which is the encoder's."""
-        output = taken.own.output
+        output = taken.samples.output
         return point_rows(
             unit=taken.unit,
-            axis=taken.own.letters,
+            axis=taken.samples.letters,
             series="output",
             point=taken.number,
             setting=float(taken.reading["outer_deg"]),
             value=output.mean(axis=0),
             uncertainty=output.std(axis=0, ddof=1) / np.sqrt(len(output)),
-            time_s=float(taken.own.time.mean()),
+            time_s=float(taken.samples.time.mean()),
         )
 
     def of_unit(self, part: TiltPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
@@ -102,16 +102,18 @@ class Tilt(RecordByRecord):
         fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _turned(part, rows)}
         linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in fits}
         # of the whole model: what K2 and K3 leave in a sine's residual is no wander
-        values = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, fits)]
+        values = [worst([_linearity(axis, fit) for axis, fit in fits.items()]), _orthogonality(part, fits)]
         if part.orders == 3:
-            scaled = ((axis, MICRO * np.array(one.of("second_order")) / one.scale[0]) for axis, one in fits.items())
-            values.append(worst([FigureValue("tilt_second_order_ug_g2", axis, *one.tolist()) for axis, one in scaled]))
+            scaled = ((axis, MICRO * np.array(fit.of("second_order")) / fit.scale[0]) for axis, fit in fits.items())
+            values.append(
+                worst([FigureValue("tilt_second_order_ug_g2", axis, *figure.tolist()) for axis, figure in scaled])
+            )
         else:
             values.append(FigureValue.not_determined("tilt_second_order_ug_g2", "*", "orders = 1; set orders = 3"))
-        return values, [_residual(axis, one) for axis, one in linear.items()]
+        return values, [_residual(axis, fit) for axis, fit in linear.items()]
 
     def of_lot(self, part: TiltPart, points: pd.DataFrame) -> Texts:
-        """What the plane leaves open."""
+        """The coefficients that a tilt in this plane does not determine."""
         turned = _turned(part, points)
         inside = (
             f"{'axes' if len(turned) > 1 else 'axis'} {' and '.join(turned)}: {'; '.join(left_open(in_plane=True))}"
@@ -127,14 +129,14 @@ class Tilt(RecordByRecord):
         traces = [level(np.array([-180.0, 180.0]), 0.0)]
         for axis in _turned(part, points):
             rows = points[points["axis"] == axis]
-            one, whole = _fit(part, rows, orders=1), _fit(part, rows)
-            residual, error = MICRO * one.residuals / one.scale[0], 2.0 * MICRO * whole.spread / one.scale[0]
+            linear, model = _fit(part, rows, orders=1), _fit(part, rows)
+            residual, error = MICRO * linear.residuals / linear.scale[0], 2.0 * MICRO * model.spread / linear.scale[0]
             name, role = f"axis {axis}, ± 2 σ", cast("Role", axis)
             traces.append(
-                Trace(name, np.degrees(one.angle), residual, role=role, error=np.broadcast_to(error, residual.shape))
+                Trace(name, np.degrees(linear.angle), residual, role=role, error=np.broadcast_to(error, residual.shape))
             )
             if part.orders == 3:
-                curve = MICRO * whole.curve(turn) / one.scale[0]
+                curve = MICRO * model.curve(turn) / linear.scale[0]
                 traces.append(Trace(f"K2 and K3 of axis {axis}", np.degrees(turn), curve, "line", role))
         axes = PlotAxis("angle / °", step=45.0), PlotAxis("residual from bias and scale / µg")
         return Chart(self.title, (Plot("", *axes, tuple(traces)),))
@@ -171,7 +173,7 @@ def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltF
 
 
 def _linearity(axis: str, fit: TiltFit) -> FigureValue:
-    """By K2 and K3 where they are fitted: the largest of many residuals is noise, whatever the axis does."""
+    """Linearity by K2 and K3 where they are fitted, since the largest of many residuals is mostly noise."""
     if "second_order" in fit.names:
         value, error = (MICRO * part / fit.scale[0] for part in fit.departure)
         low, high = value - NORMAL * error, value + NORMAL * error

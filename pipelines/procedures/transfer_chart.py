@@ -22,7 +22,7 @@ def bode_chart(points: Points, diagnosis: TransferDiagnosis, coherence: Array) -
     f = c.frequency[order]
     unit = np.sign(diagnosis.fit.sensitivity) / abs(diagnosis.extended.sensitivity)
     value = points.value[order] * unit
-    size_error, phase_error = (COVERAGE * one[order] for one in (points.magnitude_error, points.phase_error))
+    size_error, phase_error = (COVERAGE * error[order] for error in (points.magnitude_error, points.phase_error))
     fine = np.geomspace(f[0], f[-1], FINE)
     plan = c.along(fine)
     name = "measured, U (k = 2)"

@@ -43,7 +43,7 @@ def figures_of_transfer(
     Parameters
     ----------
     part : of the recipe: axis, flat_to_hz, nominal_scale, reference_percent
-    static : (3,), scale of the multi-position test, output per g; None without one
+    static : (3,), scale of the multi-position test, output per g; None without that test
     """
     model = figures_of_model(part.axis, diagnosis, points, "sweep")
     return [*model, _flatness(part, points), _sensitivity(part, diagnosis.extended, static)]
@@ -69,16 +69,16 @@ def figures_of_model(axis: str, diagnosis: TransferDiagnosis, points: Points, te
 def _parameter(figure: str, name: str, axis: str, diagnosis: TransferDiagnosis) -> FigureValue:
     if not diagnosis.extended.has(name):
         return FigureValue.not_determined(figure, axis, f"the model has no {WORD.get(name, name)}")
-    one = diagnosis.parameter(name)
-    if one.identified:
-        return FigureValue(figure, axis, one.value, one.uncertainty, one.low, one.high)
-    note = f"not identified by these points: 95 % interval {one.low:.4g} … {one.high:.4g}"
-    if one.rival is not None:
-        model, of_rival = " + ".join(one.rival.effects), one.rival.of(name)[0]
+    parameter = diagnosis.parameter(name)
+    if parameter.identified:
+        return FigureValue(figure, axis, parameter.value, parameter.uncertainty, parameter.low, parameter.high)
+    note = f"not identified by these points: 95 % interval {parameter.low:.4g} … {parameter.high:.4g}"
+    if parameter.rival is not None:
+        model, of_rival = " + ".join(parameter.rival.effects), parameter.rival.of(name)[0]
         note += f"; {model}, with {of_rival:.4g}, describes the points as well"
     where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)
     note += f"; measure at {where}" if where else "; sweep to higher frequencies"
-    return FigureValue.not_determined(figure, axis, note, one.low, one.high)
+    return FigureValue.not_determined(figure, axis, note, parameter.low, parameter.high)
 
 
 def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
@@ -160,13 +160,13 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
 
 
 def alone_text(diagnosis: TransferDiagnosis) -> str:
-    """What is said of points that depart alone; empty without any."""
+    """A sentence on single points that depart unlike any effect; empty without such points."""
     where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.alone_hz)
     return f"a point departs alone, and not as any effect would, at {where}; measure there again" if where else ""
 
 
 def _remains(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
-    """What no effect explains: single points, or a deviation of many."""
+    """Findings on what no effect explains: single points, or a deviation of many."""
     if diagnosis.alone_hz:
         return [("bad point", alone_text(diagnosis))]
     text = "a significant deviation remains that no effect of the catalogue describes"
@@ -192,10 +192,10 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
             for w in diagnosis.where[:3]
         ]
         out.append(("range of misfit", ", ".join(places)))
-    for one in diagnosis.classes:
-        first, *others = one.effects
+    for missed in diagnosis.classes:
+        first, *others = missed.effects
         alike = f"; not separated from {', '.join(others)}" if others else ""
-        out.append(("missing effect", f"{first} ({probability(one.p_value)}){alike}"))
+        out.append(("missing effect", f"{first} ({probability(missed.p_value)}){alike}"))
     if diagnosis.classes:
         before, after = diagnosis.left_out
         text = (
@@ -207,12 +207,14 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
     out += _remains(diagnosis)
     fit_effects = set(diagnosis.extended.effects)
     for p in diagnosis.extended.parameters:
-        one = diagnosis.parameter(p.name)
-        if p.log and not one.identified:
-            out.append(("not identified", f"{p.name}: 95 % interval {one.low:.4g} … {one.high:.4g} {p.unit}"))
+        parameter = diagnosis.parameter(p.name)
+        if p.log and not parameter.identified:
+            out.append(
+                ("not identified", f"{p.name}: 95 % interval {parameter.low:.4g} … {parameter.high:.4g} {p.unit}")
+            )
         elif p.name == "delay_s":
-            text = f"{1e6 * one.value:.2f} µs, 95 % interval {1e6 * one.low:.2f} … {1e6 * one.high:.2f} µs"
-            if one.rival is not None:
+            text = f"{1e6 * parameter.value:.2f} µs, 95 % interval {1e6 * parameter.low:.2f} … {1e6 * parameter.high:.2f} µs"
+            if parameter.rival is not None:
                 *_, low, high = diagnosis.extended.of(p.name)
                 others = dict.fromkeys(
                     name for fit in diagnosis.rivals for name in fit.effects if name not in fit_effects
@@ -239,9 +241,9 @@ def model_texts(diagnosis: TransferDiagnosis, points: Points) -> list[tuple[str,
     names = ("bandwidth", WORD["natural_hz"], WORD["damping"])
     units = (" Hz", " Hz", "")
     known = [
-        f"{name} {with_uncertainty(one.value, 2.0 * one.uncertainty)}{unit}"
-        for name, unit, one in zip(names, units, values, strict=True)
-        if one.identified
+        f"{name} {with_uncertainty(figure.value, 2.0 * figure.uncertainty)}{unit}"
+        for name, unit, figure in zip(names, units, values, strict=True)
+        if figure.identified
     ]
     if known:
         size = with_uncertainty(fit.sensitivity, 2.0 * abs(fit.sensitivity) * fit.sensitivity_error)

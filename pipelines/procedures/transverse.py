@@ -87,9 +87,9 @@ class TransverseTest(InG, OnEquipment, Compares):
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """The dwell on the exciter."""
-        one = step.setting
-        level, angle, seconds = one["level_g"], one["angle_deg"], step.lasting_s or 0.0
-        return equipment.sine_across(one["frequency_hz"], level, int(one["axis"]), angle, seconds, slots)
+        setting = step.setting
+        level, angle, seconds = setting["level_g"], setting["angle_deg"], step.lasting_s or 0.0
+        return equipment.sine_across(setting["frequency_hz"], level, int(setting["axis"]), angle, seconds, slots)
 
     def missing_axes(self, part: TransversePart, letters: Sequence[str]) -> list[str]:
         """The response across is that of the other axes."""
@@ -100,11 +100,11 @@ class TransverseTest(InG, OnEquipment, Compares):
         rows: list[dict[str, Any]] = []
         units = list(dict.fromkeys(str(unit) for record in records for unit in record.readings["unit"]))
         for unit in units:
-            own = [(k, record) for k, record in enumerate(records) if unit in record.samples]
-            tones = [_tones(part, record, record.samples[unit], scale_of(part, device, unit)) for _, record in own]
+            recorded = [(k, record) for k, record in enumerate(records) if unit in record.samples]
+            tones = [_tones(part, record, record.samples[unit], scale_of(part, device, unit)) for _, record in recorded]
             turns = _turns(tones)
-            for (k, record), (drive, answer, noise, whole), turn in zip(own, tones, turns, strict=True):
-                rows.append(_point(part, k, record, (drive, answer, noise), turn, whole=whole) | {"unit": unit})
+            for (k, record), (drive, answer, noise, responds), turn in zip(recorded, tones, turns, strict=True):
+                rows.append(_point(part, k, record, (drive, answer, noise), turn, responds=responds) | {"unit": unit})
         return point_table(rows)
 
     def of_unit(self, part: TransversePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
@@ -128,8 +128,8 @@ class TransverseTest(InG, OnEquipment, Compares):
         at: dict[str, Any] = {"setting": part.frequency_hz, "dof": float(fit.dof) or float("inf")}
         scale = without(figure.uncertainty, noise, 1e-2 * part.reference_percent * figure.value)
         terms = by_share(figure.value, ("reference", "drift", "amplitude"))
-        own = {"noise": noise, "nominal_scale": scale}
-        results = [ComparedResult("transverse_sensitivity", part.axis, "%", figure.value, own, terms, **at)]
+        noises = {"noise": noise, "nominal_scale": scale}
+        results = [ComparedResult("transverse_sensitivity", part.axis, "%", figure.value, noises, terms, **at)]
         if fit.direction_error_deg < 180.0:
             angle = {"noise": fit.direction_error_deg}
             results.append(
@@ -140,10 +140,10 @@ class TransverseTest(InG, OnEquipment, Compares):
 
     def chart(self, part: TransversePart, points: pd.DataFrame) -> Chart:
         """Output over the angle with its uncertainty, the fitted sine, and the direction of the maximum."""
-        kept = points[np.isfinite(points["value"])]
-        setting, value, error = numbers(kept)
+        measured = points[np.isfinite(points["value"])]
+        setting, value, error = numbers(measured)
         traces = [Trace("measured, U (k = 2)", setting, value, error=2.0 * error)]
-        if len(kept) >= FEWEST_ANGLES:
+        if len(measured) >= FEWEST_ANGLES:
             fit = fitted(points)
             angle = np.linspace(0.0, 360.0, 361)
             wave = 100.0 * (fit.value * np.cos(np.radians(angle - fit.direction_deg)) + fit.offset)
@@ -158,16 +158,16 @@ class TransverseTest(InG, OnEquipment, Compares):
 
 def fitted(rows: pd.DataFrame) -> Transverse:
     """The sine through the points of one unit that have a value."""
-    kept = rows[np.isfinite(rows["value"])]
-    if len(kept) < max(FEWEST_ANGLES, 0.8 * len(rows)):
-        msg = f"{len(kept)} of {len(rows)} angles have a value, four fifths are needed; check cable and range"
+    measured = rows[np.isfinite(rows["value"])]
+    if len(measured) < max(FEWEST_ANGLES, 0.8 * len(rows)):
+        msg = f"{len(measured)} of {len(rows)} angles have a value, four fifths are needed; check cable and range"
         raise NotIdentified(msg)
-    first, second, value, error = numbers(kept, "first", "second", "value", "uncertainty")
+    first, second, value, error = numbers(measured, "first", "second", "value", "uncertainty")
     return fit_transverse(first, second, 1e-2 * value, 1e-2 * error)
 
 
 def _tones(
-    part: TransversePart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray
+    part: TransversePart, record: ProcedureRecord, channels: UnitRecord, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
     """Tones (3,) of the reference and of the unit in g, standard uncertainties of their difference (3,), whether it responds.
 
@@ -175,24 +175,24 @@ def _tones(
     """
     reference = record.samples[REFERENCE]
     drive = fit_tone(reference.output, reference.rate_hz, part.frequency_hz, harmonics=HARMONICS)
-    output = own.output / scale
+    output = channels.output / scale
     alive = bool(np.all(np.isfinite(output)) and np.ptp(output[:, AXES.index(part.axis)]) > 0.0)
     frequency = part.frequency_hz
     seen = False
     if alive:
         strongest = int(np.argmax(output.std(axis=0)))
-        tone = fit_tone_and_frequency(output[:, [strongest]], own.rate_hz, part.frequency_hz)
+        tone = fit_tone_and_frequency(output[:, [strongest]], channels.rate_hz, part.frequency_hz)
         seen = abs(tone.value[0]) > SILENT * tone.amplitude_error[0]
         frequency = tone.frequency if seen else frequency
     shown = output if alive else np.zeros_like(output)
-    answer = fit_tone(shown, own.rate_hz, frequency, harmonics=HARMONICS)
+    answer = fit_tone(shown, channels.rate_hz, frequency, harmonics=HARMONICS)
     # the motion along the axis that the reference measures is subtracted, with its noise
     return drive.value, answer.value, np.hypot(answer.amplitude_error, drive.amplitude_error), alive and seen
 
 
 def _turns(tones: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]) -> np.ndarray:
     """Phase factor (records,) that turns the unit into phase with the reference; 1 where the unit does not respond."""
-    seen = np.array([whole for *_, whole in tones], dtype=bool)
+    seen = np.array([responds for *_, responds in tones], dtype=bool)
     turns = np.ones(len(tones), dtype=np.complex128)
     if np.count_nonzero(seen) >= FEWEST_ANGLES:
         drive, answer = (np.array([tone[k] for tone in tones])[seen] for k in (0, 1))
@@ -207,7 +207,7 @@ def _point(
     tones: tuple[np.ndarray, np.ndarray, np.ndarray],
     turn: complex,
     *,
-    whole: bool,
+    responds: bool,
 ) -> dict[str, Any]:
     """One angle of one unit: the part along the axis that the reference measures is subtracted."""
     drive, answer, noise = tones
@@ -218,15 +218,15 @@ def _point(
     ratio = float(np.real(answer[axis] * turn / driven) - np.real(drive[axis] / driven))
     # noise of the phase moves what is subtracted by the motion along the axis that is in quadrature
     quadrature = abs(np.imag(drive[axis] / driven)) * float(np.hypot(noise[first], noise[second])) / np.sqrt(2.0)
-    own = float(np.hypot(noise[axis], quadrature)) / abs(driven)
-    error = float(np.hypot(own, 1e-6 * part.repeatability_ppm))
+    noise_u = float(np.hypot(noise[axis], quadrature)) / abs(driven)
+    error = float(np.hypot(noise_u, 1e-6 * part.repeatability_ppm))
     return {
         "axis": part.axis,
         "series": "across",
         "point": number,
         "setting": angle,
-        "value": 100.0 * ratio if whole else np.nan,
-        "uncertainty": 100.0 * error if whole else np.nan,
+        "value": 100.0 * ratio if responds else np.nan,
+        "uncertainty": 100.0 * error if responds else np.nan,
         "first": float(np.real(drive[first] / driven)),
         "second": float(np.real(drive[second] / driven)),
         "along_percent": 100.0 * float(abs(drive[axis] / driven)),

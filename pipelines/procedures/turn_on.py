@@ -61,8 +61,8 @@ class TurnOn(InG, RecordByRecord):
 
     def points(self, part: TurnOnPart, taken: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean of a cycle in µg; its uncertainty from the scatter of ten parts of the window."""
-        letters = taken.own.letters
-        output = taken.own.output / scale_of(part, device, taken.unit)[: len(letters)] * MICRO
+        letters = taken.samples.letters
+        output = taken.samples.output / scale_of(part, device, taken.unit)[: len(letters)] * MICRO
         return point_rows(
             unit=taken.unit,
             axis=letters,
@@ -76,22 +76,22 @@ class TurnOn(InG, RecordByRecord):
     def of_unit(self, part: TurnOnPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Scatter of the worst axis, and its upper limit: few cycles cannot pass a limit close to the estimate."""
         value, upper = list[FigureValue](), list[FigureValue]()
-        for axis, own in rows.groupby("axis", sort=False):
-            mean, error = numbers(own, "value", "uncertainty")
+        for axis, cycles in rows.groupby("axis", sort=False):
+            mean, error = numbers(cycles, "value", "uncertainty")
             within = float(np.sqrt(np.mean(error**2)))
-            one = repeatability(mean, within)
-            spread = float(np.std(mean, ddof=1)) / np.sqrt(2.0 * (one.cycles - 1))
-            ends = one.value, spread, one.low, one.high
-            value.append(FigureValue(REPEATABILITY, str(axis), *ends, dof=one.cycles - 1.0, removed=within))
-            upper.append(FigureValue(UPPER, str(axis), one.upper, 0.0))
+            scatter = repeatability(mean, within)
+            spread = float(np.std(mean, ddof=1)) / np.sqrt(2.0 * (scatter.cycles - 1))
+            ends = scatter.value, spread, scatter.low, scatter.high
+            value.append(FigureValue(REPEATABILITY, str(axis), *ends, dof=scatter.cycles - 1.0, removed=within))
+            upper.append(FigureValue(UPPER, str(axis), scatter.upper, 0.0))
         return [worst(value), worst(upper)], []
 
     def chart(self, part: TurnOnPart, points: pd.DataFrame) -> Chart:
         """Mean of every cycle about the mean of all, with the standard deviation of each axis."""
         traces: list[Trace] = []
         for k, axis in enumerate(axes_among(points["axis"])):
-            own = points[points["axis"] == axis]
-            cycle, value, error = numbers(own)
+            cycles = points[points["axis"] == axis]
+            cycle, value, error = numbers(cycles)
             value = value - value.mean()
             traces.append(Trace(f"axis {axis}", cycle + 0.12 * (k - 1), value, role=axis, error=error))
             spread = float(np.std(value, ddof=1))

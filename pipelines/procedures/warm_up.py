@@ -46,7 +46,7 @@ class WarmUp(InG, RecordByRecord):
     )
 
     def steps(self, part: WarmUpPart, recipe: Recipe) -> list[ProcedureStep]:
-        """One record directly after power-on."""
+        """A single record, directly after power-on."""
         pose = at_rest("warm-up")
         lasting, rate = part.lasting_s, part.rate_hz
         return [
@@ -59,8 +59,8 @@ class WarmUp(InG, RecordByRecord):
         """Means of 1 s in µg over the time since power-on."""
         size, scale = round(part.rate_hz), scale_of(part, device, taken.unit)
         begun = float(taken.reading["since_power_s"]) - 0.5 * float(taken.reading["duration_s"])
-        for i, axis in enumerate(taken.own.letters):
-            second = block_means(taken.own.output[:, i], size) / scale[i] * MICRO
+        for i, axis in enumerate(taken.samples.letters):
+            second = block_means(taken.samples.output[:, i], size) / scale[i] * MICRO
             noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
             k = np.arange(second.size)
             time = begun + (k + 0.5) * size / part.rate_hz
@@ -70,15 +70,15 @@ class WarmUp(InG, RecordByRecord):
 
     def of_unit(self, part: WarmUpPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The time of the slowest axis; not determined where the record ends too soon, or noise alone exceeds the band."""
-        return [worst([_figure(part, str(axis), own) for axis, own in rows.groupby("axis", sort=False)])], []
+        return [worst([_figure(part, str(axis), record) for axis, record in rows.groupby("axis", sort=False)])], []
 
     def chart(self, part: WarmUpPart, points: pd.DataFrame) -> Chart:
         """Output about its final value over the time since power-on, with the band."""
         time = points["setting"].to_numpy(dtype=float)
         traces = [between(time, -part.band_ug, part.band_ug, f"band ± {part.band_ug:g} µg")]
         for axis in axes_among(points["axis"]):
-            own = points[points["axis"] == axis]
-            since, value = numbers(own, "setting", "value")
+            record = points[points["axis"] == axis]
+            since, value = numbers(record, "setting", "value")
             final = value[int(0.8 * value.size) :].mean()
             traces.append(Trace(f"axis {axis}", since, value - final, "line", axis, width=0.8))
         axes = PlotAxis("time since power-on / s"), PlotAxis("output minus final value / µg")

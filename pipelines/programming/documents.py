@@ -19,7 +19,7 @@ class VerifiedPoseDocument(TypedDict):
 
 
 class ProgrammedUnitDocument(TypedDict):
-    """What became of one device."""
+    """The outcome of programming one device."""
 
     unit: str
     outcome: Literal["proved", "failed"]
@@ -44,7 +44,7 @@ class TedsPageDocument(TypedDict):
 
 
 class TedsUnitDocument(TypedDict):
-    """What became of the TEDS of one device."""
+    """The outcome of writing the TEDS of one device."""
 
     unit: str
     outcome: Literal["proved", "failed"]

@@ -133,15 +133,15 @@ def _measured_at(run: Run) -> str:
 def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None:
     """The calibration of this run that a unit has today, or had until a programming that was not completed.
 
-    The last one of the run decides: one before it, which an earlier writing ended, does not come back where the last was ended
+    The last calibration of the run decides: an earlier one, which a writing ended, does not come back where the last was ended
     for another reason.
     """
-    own = [
+    of_run = [
         calibration
         for calibration in ledger.calibrations(serial)
         if calibration.run == run and calibration.stated_until > day >= calibration.start
     ]
-    last = own[-1] if own else None
+    last = of_run[-1] if of_run else None
     if last is None or last.holds(day):
         return last
     return last if last.ended_by is not None and last.ended_by.reason == WRITING else None
@@ -152,15 +152,15 @@ def open_lot(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[
     """The station, and a function that saves the state of a simulated one, from which the next programming continues."""
     lot = Lot.model_validate(run.about["lot"])
     root = run.archive.root
-    place = root / TOP / "station" / f"{run.about['capture']}.bin"
+    path = root / TOP / "station" / f"{run.about['capture']}.bin"
     resume = None
     if config.kind == "simulated":
-        resume = place.read_bytes() if place.is_file() else Archive(root).capture(run.about["capture"]).last_state()
+        resume = path.read_bytes() if path.is_file() else Archive(root).capture(run.about["capture"]).last_state()
     with open_station(config, lot, resume=resume, run=f"program {run.id}") as station:
 
         def saved() -> None:
             if config.kind == "simulated":
-                files.publish(place, station.state())
+                files.publish(path, station.state())
 
         yield station, saved
 

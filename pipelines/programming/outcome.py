@@ -36,7 +36,7 @@ class Choice:
 class ProgrammingOutcome:
     """Outcome of a unit: ``proved``, or ``failed`` at a step for a reason.
 
-    certificate : number of the certificate that the block contains; 0 without one
+    certificate : number of the certificate that the block contains; 0 without a certificate
     """
 
     serial: str

@@ -79,24 +79,24 @@ class Programmer:
         except BaseException as problem:
             self._all_failed(outcomes, step, problem)
             raise
-        for one in outcomes:
-            if one.open:
-                one.outcome = "proved"
-                add(self.root, one.serial, "proved", {"run": self.run, **one.document()})
+        for outcome in outcomes:
+            if outcome.open:
+                outcome.outcome = "proved"
+                add(self.root, outcome.serial, "proved", {"run": self.run, **outcome.document()})
         self.saved()
         return outcomes
 
     def _all_failed(self, outcomes: Sequence[ProgrammingOutcome], step: str, problem: BaseException) -> None:
-        """Records every unit whose programming has begun as failed; one that cannot be recorded does not hide the others.
+        """Records every unit whose programming has begun as failed; a failing record does not hide the others.
 
         A beginning without an end counts as failed as well, so a missing record leaves no unit certified.
         """
-        for one in outcomes:
-            if one.open and one.block is not None:
+        for outcome in outcomes:
+            if outcome.open and outcome.block is not None:
                 try:
-                    self._failed(one, step, str(problem) or type(problem).__name__)
+                    self._failed(outcome, step, str(problem) or type(problem).__name__)
                 except (TumblelineError, OSError) as second:
-                    problem.add_note(f"the failure of unit {one.serial} could not be recorded either: {second}")
+                    problem.add_note(f"the failure of unit {outcome.serial} could not be recorded either: {second}")
 
     def _require(self) -> None:
         """Ends the programming where the lease is lost, the emergency stop is pressed or the door is open.
@@ -203,10 +203,10 @@ class Programmer:
         """Refuses a copy that differs from the written bytes."""
         read_back = outcome.memory.read(outcome.copy)[: len(outcome.content)]
         if read_back != outcome.content:
-            place = next(i for i, (a, b) in enumerate(zip(read_back, outcome.content, strict=True)) if a != b)
+            offset = next(i for i, (a, b) in enumerate(zip(read_back, outcome.content, strict=True)) if a != b)
             raise StationRefused(
-                f"{outcome.memory.name}: copy {outcome.copy.upper()} differs from what was written from byte {place} on "
-                f"({read_back[place]:#04x}, {outcome.content[place]:#04x} is needed); replace the device"
+                f"{outcome.memory.name}: copy {outcome.copy.upper()} differs from what was written from byte {offset} on "
+                f"({read_back[offset]:#04x}, {outcome.content[offset]:#04x} is needed); replace the device"
             )
 
     def _power_cycle(self) -> None:
@@ -246,8 +246,8 @@ class Programmer:
                 self._each(
                     outcomes,
                     "verify offset registers",
-                    lambda one, a=plain, b=moved: require_moved(
-                        one, a[one.slot], b[one.slot], self.choice.tolerance_ug
+                    lambda outcome, a=plain, b=moved: require_moved(
+                        outcome, a[outcome.slot], b[outcome.slot], self.choice.tolerance_ug
                     ),
                 )
                 plain = moved
@@ -258,8 +258,13 @@ class Programmer:
             self._each(
                 outcomes,
                 "verify",
-                lambda one, f=force, m=plain, t=temperatures, p=pose.name: require_in_pose(
-                    one, p, f, one.unit.with_forces(m[one.slot], f), t[one.slot], self.choice.tolerance_ug
+                lambda outcome, f=force, m=plain, t=temperatures, p=pose.name: require_in_pose(
+                    outcome,
+                    p,
+                    f,
+                    outcome.unit.with_forces(m[outcome.slot], f),
+                    t[outcome.slot],
+                    self.choice.tolerance_ug,
                 ),
             )
 

@@ -16,7 +16,7 @@ from stations.devices.teds_memory import PAGE, TedsMemory
 
 @dataclass
 class TedsOutcome:
-    """What became of one device.
+    """The outcome of writing the TEDS of one device.
 
     pages : by axis, in the order of the memory · before : the whole memory before the first write
     """
@@ -67,18 +67,18 @@ def program_teds(
 
     Coefficients and certificates stay as they are: the pages state the certificate's sensitivity, they do not apply it.
     """
-    pages = {unit.unit: pages_of(unit, run.id, sheet) for _, unit in units}  # all are refused before one is written
+    pages = {unit.unit: pages_of(unit, run.id, sheet) for _, unit in units}  # all are refused before any is written
     with open_lot(run, config) as (station, saved):
         slots = station.reader.slots
         outcomes = [TedsOutcome(unit.unit, slot, pages[unit.unit], slots[slot].teds()) for slot, unit in units]
         require_safe(station, config.suspenders.door)
         if station.reader.sampling() == "running":
             station.reader.stop()
-        for one in outcomes:
-            one.memory.require()
-            if not slots[one.slot].holds(one.unit):
+        for outcome in outcomes:
+            outcome.memory.require()
+            if not slots[outcome.slot].holds(outcome.unit):
                 raise OperatorNeeded(
-                    f"slot {one.slot}: unit {one.unit} is not in it; seat the unit, or correct the lot"
+                    f"slot {outcome.slot}: unit {outcome.unit} is not in it; seat the unit, or correct the lot"
                 )
         for step, act in (("archive the memory", _archive), ("write", _write), ("read back", _read_back)):
             _each(outcomes, step, act, report)
@@ -88,8 +88,8 @@ def program_teds(
             power_cycle(station, config.suspenders.door)
         _each(outcomes, "read back after the power cycle", _read_back, report)
         saved()
-    for one in outcomes:
-        one.outcome = "proved" if one.outcome == "begun" else one.outcome
+    for outcome in outcomes:
+        outcome.outcome = "proved" if outcome.outcome == "begun" else outcome.outcome
     return outcomes
 
 

@@ -60,7 +60,7 @@ def renew_report(run: Run) -> None:
 
 
 def _captured(run: Run) -> bool:
-    """Whether a run was measured on a station, or is one of a lot that was, not imported."""
+    """Whether the units of a run were measured on a station, not imported."""
     return bool(run.about.get("capture") or run.about.get("parents"))
 
 
@@ -83,7 +83,7 @@ def keep_report(
     if certificates:
         parameters = {
             **parameters,
-            "certificates": {unit: one.key_values() for unit, one in sorted(certificates.items())},
+            "certificates": {unit: calibration.key_values() for unit, calibration in sorted(certificates.items())},
         }
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):

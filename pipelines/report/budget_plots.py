@@ -21,21 +21,21 @@ def shares_plot(shares: Mapping[str, Mapping[str, float]]) -> str:
     ----------
     shares : by title of the quantity, then by contribution; each sums to 1
     """
-    every = dict.fromkeys(name for one in shares.values() for name in one)
-    names = [name for name in every if max(one.get(name, 0.0) for one in shares.values()) >= SMALLEST]
-    names.sort(key=lambda name: -sum(one.get(name, 0.0) for one in shares.values()))
+    every = dict.fromkeys(name for by_name in shares.values() for name in by_name)
+    names = [name for name in every if max(by_name.get(name, 0.0) for by_name in shares.values()) >= SMALLEST]
+    names.sort(key=lambda name: -sum(by_name.get(name, 0.0) for by_name in shares.values()))
     colours = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(names)}
-    rest = {title: max(0.0, 1.0 - sum(one.get(name, 0.0) for name in names)) for title, one in shares.items()}
+    rest = {title: max(0.0, 1.0 - sum(by_name.get(name, 0.0) for name in names)) for title, by_name in shares.items()}
     if max(rest.values(), default=0.0) > 1e-3:
         colours["others"] = REST
     left = 16.0 + LETTER * max((len(title) for title in shares), default=0)
     wide, bottom = WIDTH - left - RIGHT, LINE * len(shares) + 4.0
     parts: list[str] = []
-    for row, (title, one) in enumerate(shares.items()):
+    for row, (title, by_name) in enumerate(shares.items()):
         top, at = LINE * row + 6.0, left
         parts.append(text_at(left - 8.0, top + 0.5 * THICK + 4.0, title, 'text-anchor="end"'))
         for name, colour in colours.items():
-            share = rest[title] if name == "others" else one.get(name, 0.0)
+            share = rest[title] if name == "others" else by_name.get(name, 0.0)
             if share > 0.0:
                 tip = f"<title>{escape(name)}: {100.0 * share:.3g} %</title>"
                 parts.append(

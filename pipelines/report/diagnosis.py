@@ -47,7 +47,7 @@ def render_diagnosis(made: Examination, source: str, coefficients: list[dict[str
 
 
 def _members(group: EffectClassDocument, document: DiagnosisDocument) -> list[dict[str, Any]]:
-    """The effects of a class, or its handling errors, each with symbol and equation, and which one is recommended."""
+    """The effects of a class, or its handling errors, each with symbol and equation, and which of them is recommended."""
     simplest = next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
     members: list[dict[str, Any]] = []
     for name in group["effects"]:

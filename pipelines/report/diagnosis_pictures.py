@@ -72,15 +72,15 @@ def pose_chart(
     models : name, and residuals (axes, n), µg; NaN where a dwell is missing
     pick : selection by a click on the point of a dwell
     """
-    poses, first, place = np.unique(np.round(force, 2) + 0.0, axis=0, return_index=True, return_inverse=True)
+    poses, first, pose = np.unique(np.round(force, 2) + 0.0, axis=0, return_index=True, return_inverse=True)
     x, y = project(poses)
     plots: list[Plot] = []
     everything: list[Array] = []
     for label, residual in models:
         for axis, values in zip(axes, residual, strict=True):
             finite = np.isfinite(values)
-            there = np.unique(place.reshape(-1)[finite])
-            means = np.array([values[finite & (place.reshape(-1) == k)].mean() for k in there])
+            there = np.unique(pose.reshape(-1)[finite])
+            means = np.array([values[finite & (pose.reshape(-1) == k)].mean() for k in there])
             texts = tuple(
                 f"f = ({p[0]:+.2f}, {p[1]:+.2f}, {p[2]:+.2f}) g: {mean:.3g} µg"
                 for p, mean in zip(poses[there], means, strict=True)
@@ -140,14 +140,14 @@ def quantity_chart(
     colour: Literal["axis", "direction", "slot"] = "axis",
     names: tuple[str, str] = ("before", "after"),
 ) -> Chart:
-    """Residuals of a lot against a recorded quantity; the previous model on the left if there is one, on one scale.
+    """Residuals of a lot against a recorded quantity; the previous model, if any, on the left, on one scale.
 
     Parameters
     ----------
     before : residuals of the previous model, as in the table
-    unit : place of the unit that stands out
+    unit : index of the unit that stands out
     colour : what colours tell of the points of that unit: the axis, or the way the temperature was reached
-    names : of the previous model and of this one
+    names : of the previous model and of this model
     """
     label, values = table.drivers[quantity]
     sides = (
@@ -196,7 +196,7 @@ def _standing_out(table: ResidualTable, residual: Array, along: Array, unit: int
 
 
 def slot_chart(table: ResidualTable) -> Chart | None:
-    """Mean residual of every unit by slot, axis by axis: the influence of the place on the fixture; None without slots."""
+    """Mean residual of every unit by slot, axis by axis: the influence of the slot; None without slots."""
     if "slot" not in table.drivers:
         return None
     slot = table.drivers["slot"][1][:, 0]

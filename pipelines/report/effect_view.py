@@ -22,7 +22,7 @@ from schemas.units import MICRO
 
 FOLLOWED = 0.8
 """Least part of an effect's contribution that is a function of a quantity, for the effect to be drawn against that quantity."""
-FINE = 0.01  # of a range: nearer values are the same one
+FINE = 0.01  # of a range: nearer values count as equal
 FEW = 8
 MOST_VIEWS = 3
 CONTRIBUTION = "the contribution of"  # the quantity of an effect that follows no recorded one
@@ -35,7 +35,7 @@ BOTH_SIDES = 2.0  # standard deviations of the band of noise
 class EffectView:
     """The residuals of one axis of a lot against a quantity, µg, (units, n); NaN where a dwell is missing.
 
-    effect : its id; empty where none is missing · quantity : label with its unit · shown : place of the unit that stands out
+    effect : its id; empty where none is missing · quantity : label with its unit · shown : index of the unit that stands out
     x : the quantity · after : with the effect in the model; None where none is missing · curve : what the effect adds
     floor : noise of the measurement, µg rms
     """
@@ -58,7 +58,7 @@ class EffectView:
 
     @property
     def fall(self) -> float:
-        """What the effect takes off the squares of the residuals."""
+        """Fall of the mean square of the residuals by the effect, µg²; 0 without a fit with it."""
         return 0.0 if self.after is None else float(np.nanmean(self.before**2) - np.nanmean(self.after**2))
 
     @property
@@ -69,7 +69,7 @@ class EffectView:
 
     @property
     def title(self) -> str:
-        """What the picture shows."""
+        """Title of the picture."""
         depends = (
             f", on which {self.effect} depends" if self.effect and not self.quantity.startswith(CONTRIBUTION) else ""
         )
@@ -97,7 +97,7 @@ class EffectView:
 
 
 def effect_views(diagnosis: Diagnosis, units: tuple[str, ...], held: str = "") -> list[EffectView]:
-    """A view of each missing effect, the largest first; without one of the residual against what it follows most.
+    """A view of each missing effect, the largest first; without a missing effect, of the residual against what it follows most.
 
     held : an effect of the judged model, which is seen where none is missing; empty for none
     """
@@ -130,7 +130,11 @@ def _view(
     fallen = np.nanmean(before**2, axis=2) - np.nanmean(after**2, axis=2)
     shown, axis = (int(k) for k in np.unravel_index(int(np.argmax(fallen)), fallen.shape))
     quantity = next(
-        (one for one in _quantities(problem, term, axis) if followed(one.values[shown], adds[shown, axis]) > FOLLOWED),
+        (
+            quantity
+            for quantity in _quantities(problem, term, axis)
+            if followed(quantity.values[shown], adds[shown, axis]) > FOLLOWED
+        ),
         DriverValues("", f"{CONTRIBUTION} {term.effect.id} / µg", adds[:, axis]),
     )
     return EffectView(
@@ -144,8 +148,10 @@ def _plain(diagnosis: Diagnosis, units: tuple[str, ...], residual: Array, floor:
     problem = diagnosis.problem
     sizes = np.nanmean(residual**2, axis=2)
     shown, axis = (int(k) for k in np.unravel_index(int(np.argmax(sizes)), sizes.shape))
-    known = {one.name: one for one in recorded_quantities(problem)}
-    follows = [one.driver for one in (*([diagnosis.unexplained] if diagnosis.unexplained else []), *diagnosis.where)]
+    known = {quantity.name: quantity for quantity in recorded_quantities(problem)}
+    follows = [
+        misfit.driver for misfit in (*([diagnosis.unexplained] if diagnosis.unexplained else []), *diagnosis.where)
+    ]
     forces = [] if problem.lot.radial else [_forces(problem, axis)[0]]
     quantity = next(
         (_of_axis(known[name], axis) for name in follows if name in known),
@@ -160,7 +166,7 @@ def _plain(diagnosis: Diagnosis, units: tuple[str, ...], residual: Array, floor:
 
 
 def _smooth(x: Array, y: Array) -> Array:
-    """A smooth curve through points at their own places; NaN where there are too few."""
+    """A smooth curve through points, at their abscissas; NaN where there are too few."""
     places, low, high = band(x, y)
     return np.interp(x, places, 0.5 * (low + high)) if places.size else np.full(x.shape, np.nan)
 
@@ -178,7 +184,7 @@ def _of_axis(driver: DriverValues, axis: int) -> DriverValues:
 
 def _forces(problem: Problem, axis: int) -> list[DriverValues]:
     """The specific force along an axis of the lot, then along the others; (units, n)."""
-    own = problem.axes[axis]
+    along = problem.axes[axis]
     shape = (problem.lot.output.shape[0], problem.n)
     return [
         DriverValues(
@@ -186,7 +192,7 @@ def _forces(problem: Problem, axis: int) -> list[DriverValues]:
             f"specific force along {'xyz'[k]} / g",
             np.broadcast_to(problem.lot.state.force[..., k], shape),
         )
-        for k in (own, *(k for k in range(3) if k != own))
+        for k in (along, *(k for k in range(3) if k != along))
     ]
 
 
@@ -199,14 +205,14 @@ def _quantities(problem: Problem, term: Term, axis: int) -> Iterator[DriverValue
         return
     columns = {row.attribute: row.column for row in RECORDED}
     names = drivers_of(state, effect)
-    own = [known[columns[name]] for name in sorted(names) if columns.get(name) in known]
-    if not names:  # of a recorded column that has no place in the state
-        own = [known[effect.id]] if effect.id in known else list(known.values())
+    quantities = [known[columns[name]] for name in sorted(names) if columns.get(name) in known]
+    if not names:  # of a recorded column that the state does not hold
+        quantities = [known[effect.id]] if effect.id in known else list(known.values())
     forces = [] if problem.lot.radial or "force" not in names else _forces(problem, axis)
-    yield from (*forces, *own)
-    for one, other in combinations_with_replacement([*forces, *own], 2):
-        yield DriverValues("", _product(one, other), _about(one) * _about(other))
-    for force, other in product(forces, own):
+    yield from (*forces, *quantities)
+    for first, other in combinations_with_replacement([*forces, *quantities], 2):
+        yield DriverValues("", _product(first, other), _about(first) * _about(other))
+    for force, other in product(forces, quantities):
         label, _, unit = other.label.partition(" / ")
         square = f"{force.name}·({label} less its mean)² / g·{unit}²"
         yield DriverValues("", square, force.values * _about(other) ** 2)
@@ -246,7 +252,7 @@ def followed(x: Array, y: Array) -> float:
 
 
 def _alike(x: Array) -> tuple[Index, Array]:
-    """For each value the number of its group of nearly equal ones, which are numbered in order; and the size of each group."""
+    """For each value the number of its group of nearly equal values, ascending; and the size of each group."""
     order = np.argsort(x)
     group = np.empty(x.size, dtype=np.intp)
     group[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > FINE * np.ptp(x))])
@@ -254,7 +260,7 @@ def _alike(x: Array) -> tuple[Index, Array]:
 
 
 def _means(x: Array, y: Array) -> tuple[Array, Array]:
-    """The mean of values with nearly the same x, in order of x."""
+    """The mean of values with nearly equal x, in order of x."""
     if not x.size:
         return x, y
     group, count = _alike(x)
@@ -264,7 +270,7 @@ def _means(x: Array, y: Array) -> tuple[Array, Array]:
 def effect_chart(view: EffectView, pick: Callable[[int, int], str] | None = None) -> Chart:
     """Before and after: the points of a unit, the model's curve through them, and a fan of the curves of the other units.
 
-    pick : selection by a click on the point of a dwell, from the places of its unit and of itself
+    pick : selection by a click on the point of a dwell, from the indices of its unit and of itself
     """
     picks = () if pick is None else tuple(pick(view.shown, k) for k in range(view.x.shape[1]))
     x, noise = view.x[view.shown], BOTH_SIDES * view.floor

@@ -75,9 +75,9 @@ def _bundle() -> str:
 
 
 def _policy(script: str) -> str:
-    """What a browser may do for this page: run these two scripts, and load nothing."""
+    """The Content-Security-Policy of the page: these two scripts may run, and nothing may be loaded."""
     hashes = [sha256(script.encode()).digest(), bytes.fromhex(BUNDLE_SHA256)]
-    allowed = " ".join(f"'sha256-{b64encode(one).decode()}'" for one in hashes)
+    allowed = " ".join(f"'sha256-{b64encode(digest).decode()}'" for digest in hashes)
     rules = f"default-src 'none'; script-src {allowed}; "
     rules += "style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'"
     return f'<meta http-equiv="Content-Security-Policy" content="{rules}">'

@@ -22,15 +22,15 @@ COLUMNS = ("lot", "fixture", "activity", "temperature_C", "begin_min", "end_min"
 
 def line_chart(document: LineDocument) -> Chart:
     """Fixtures above, shared resources and operators below them, over the hours from the start."""
-    fixtures = list(dict.fromkeys(lot["fixture"] for lot in sorted(document["lots"], key=lambda one: one["fixture"])))
+    fixtures = list(dict.fromkeys(lot["fixture"] for lot in sorted(document["lots"], key=lambda lot: lot["fixture"])))
     shared = [row["resource"] for row in document["resources"] if row["resource"] != "fixtures"]
     rows = [*reversed(shared), *reversed(fixtures)]
     bars: dict[str, tuple[Role, list[float], list[float]]] = {}
-    for one in document["activities"]:
-        name = NAMES.get(one["activity"], one["activity"])
-        _, x, y = bars.setdefault(name, (ROLES.get(one["activity"], OTHER), [], []))
-        for row in (one["fixture"], *one["resources"]):
-            x += [one["begin_min"] / 60.0, one["end_min"] / 60.0, np.nan]
+    for activity in document["activities"]:
+        name = NAMES.get(activity["activity"], activity["activity"])
+        _, x, y = bars.setdefault(name, (ROLES.get(activity["activity"], OTHER), [], []))
+        for row in (activity["fixture"], *activity["resources"]):
+            x += [activity["begin_min"] / 60.0, activity["end_min"] / 60.0, np.nan]
             y += [rows.index(row)] * 2 + [np.nan]
     traces = [Trace(name, np.array(x), np.array(y), "line", role, width=THICK) for name, (role, x, y) in bars.items()]
     spans = [

@@ -28,15 +28,15 @@ def model_view(unit: str, dwells: pd.DataFrame, residuals: pd.DataFrame, effects
     if not changed:
         both["before_ug"], fall = both["residual_ug"], squares["residual_ug"]
     axis = str(fall.idxmax())
-    own = both[both["axis"] == axis].sort_values("dwell")
-    quantity = follows_most(own.assign(residual_ug=own["before_ug"]), dwells)
+    rows = both[both["axis"] == axis].sort_values("dwell")
+    quantity = follows_most(rows.assign(residual_ug=rows["before_ug"]), dwells)
     column = COLUMNS.get(quantity, quantity)
-    across = shown_factor(column) * timed(own, dwells)[column].to_numpy(float)[None]
-    before, after = (own[name].to_numpy(float)[None] for name in ("before_ug", "residual_ug"))
-    expected = own["expected_ug"].to_numpy(float) if "expected_ug" in own else np.zeros(1)
+    across = shown_factor(column) * timed(rows, dwells)[column].to_numpy(float)[None]
+    before, after = (rows[name].to_numpy(float)[None] for name in ("before_ug", "residual_ug"))
+    expected = rows["expected_ug"].to_numpy(float) if "expected_ug" in rows else np.zeros(1)
     return EffectView(
         ("" if not changed else ", ".join(more) if len(more) <= FEW else f"{len(more)} more effects"),
-        quantities(own, dwells)[quantity], axis, (unit,), 0, across,
+        quantities(rows, dwells)[quantity], axis, (unit,), 0, across,
         before, after if changed else None, before - after if changed else None, float(np.sqrt(np.mean(expected**2))),
     )  # fmt: skip
 
@@ -44,11 +44,11 @@ def model_view(unit: str, dwells: pd.DataFrame, residuals: pd.DataFrame, effects
 def _linear(dwells: pd.DataFrame, residuals: pd.DataFrame) -> pd.Series:
     """Residuals of least squares in the forces along all axes, µg, in the rows of ``residuals``."""
     left = pd.Series(np.nan, index=residuals.index)
-    for axis, own in residuals.groupby("axis"):
-        rows = own[["dwell"]].merge(dwells, on="dwell", how="left")
+    for axis, of_axis in residuals.groupby("axis"):
+        rows = of_axis[["dwell"]].merge(dwells, on="dwell", how="left")
         force, output = rows[list(FORCE_COLUMNS)].to_numpy(float), rows[f"out_{axis}"].to_numpy(float)
         design = np.column_stack([np.ones(len(rows)), force])
         coefficients = np.linalg.lstsq(design, output, rcond=None)[0]
         scale = abs(float(coefficients[1 + "xyz".index(str(axis))]))
-        left.loc[own.index] = MICRO * (output - design @ coefficients) / scale
+        left.loc[of_axis.index] = MICRO * (output - design @ coefficients) / scale
     return left

@@ -56,12 +56,12 @@ def _curves(document: dict[str, Any]) -> Chart:
 
 def _spectra(document: dict[str, Any]) -> Chart:
     """Noise density of every channel against frequency."""
-    whole = np.array(document["frequency_hz"])[1:]
+    lines = np.array(document["frequency_hz"])[1:]
     # so many points for each decade: a record of a million samples would be drawn as a black bar
-    cell = np.floor(PER_DECADE * np.log10(whole / whole[0])).astype(int)
+    cell = np.floor(PER_DECADE * np.log10(lines / lines[0])).astype(int)
     _, group = np.unique(cell, return_inverse=True)
     count = np.bincount(group)
-    frequency = np.exp(np.bincount(group, weights=np.log(whole)) / count)
+    frequency = np.exp(np.bincount(group, weights=np.log(lines)) / count)
     traces: list[Trace] = []
     for k, row in enumerate(document["spectra"]):
         amplitude = np.sqrt(np.bincount(group, weights=np.array(row["density"])[1:]) / count)

@@ -32,7 +32,7 @@ def scientific(value: float, number: Callable[[float], str] = significant) -> st
 
 
 def with_uncertainty(value: float, expanded: float) -> tuple[str, str]:
-    """Value and expanded uncertainty, the uncertainty to two digits and the value to the same place (GUM 7.2.6)."""
+    """Value and expanded uncertainty, the uncertainty to two digits and the value to the same decimal (GUM 7.2.6)."""
     if not math.isfinite(expanded) or expanded <= 0.0:
         return significant(value, 4), ""
     if expanded < 1e-7:
@@ -52,7 +52,7 @@ def _signed(text: str) -> str:
 def side_by_side(
     rows: Iterable[Mapping[str, Any]], cell: Callable[[Mapping[str, Any]], Any], unit: str = "unit_text"
 ) -> list[dict[str, Any]]:
-    """Lines with ``effect``, ``unit``, ``names`` of the coefficient and ``cells`` by axis; ``*`` for one that axes share.
+    """Lines with ``effect``, ``unit``, ``names`` of the coefficient and ``cells`` by axis; ``*`` for a coefficient of all axes.
 
     ``title`` is the effect, with the names where it has several lines.
 

@@ -1,4 +1,4 @@
-"""The panels of a report: each is one module of a package and is found there."""
+"""The panels of a report: each module of a package is a panel, and is discovered there."""
 
 from collections import Counter
 from functools import cache
@@ -10,7 +10,7 @@ from typing import Any, Protocol, cast
 class Panel(Protocol):
     """A module of ``pipelines.report.panels`` (of the run) or ``pipelines.report.unit_panels`` (of each unit).
 
-    ORDER : place in the page, ascending · TITLE : heading, empty for none
+    ORDER : panels are shown by it, ascending · TITLE : heading, empty for none
     """
 
     ORDER: int
@@ -22,7 +22,7 @@ class Panel(Protocol):
 
 
 class IncompletePanel(Exception):
-    """An incomplete module of a panel, or one with the ORDER of another: its author must correct it."""
+    """A module of a panel that is incomplete, or has the ORDER of another: its author must correct it."""
 
 
 @cache

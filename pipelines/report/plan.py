@@ -67,7 +67,7 @@ def _budget(reach: dict[str, Any] | None) -> str:
         "bias_error_period": "error over the period",
         "verification_norm": "error in a verification pose, with noise",
     }
-    worst.pop(LARGEST_ERROR, None)  # made of the same contributions
+    worst.pop(LARGEST_ERROR, None)  # it has the contributions of its parts
     return shares_plot(
         {f"{titles.get(q, q)}, {axis_word(row['axis'])}": row["shares"] for q, row in worst.items() if row["shares"]}
     )
@@ -87,9 +87,9 @@ def sphere_chart(context: PlanContext) -> Chart:
     traces: list[Trace] = []
     first = [a for a in context.activities if a.kind == "dwell" and a.step.soak == context.activities[0].step.soak]
     for kind, label, role, symbol in KINDS[:2]:
-        own = [a.step.pose for a in context.activities if a.kind == kind]
-        if own:
-            named = {(pose.outer_deg, pose.inner_deg): pose.name for pose in own}
+        poses = [a.step.pose for a in context.activities if a.kind == kind]
+        if poses:
+            named = {(pose.outer_deg, pose.inner_deg): pose.name for pose in poses}
             outer, inner = np.radians(np.array(list(named))).T
             x, y = project(force_from_angles(outer, inner))
             texts = tuple(f"{name}: outer {o:g}°, inner {i:g}°" for (o, i), name in named.items())
@@ -124,13 +124,13 @@ def temperature_chart(context: PlanContext) -> Chart:
     span = float(max(air.max(), device.max())) - low or 1.0
     traces = [Trace("chamber", hours, air, "line", "muted"), Trace("slowest device", hours, device, "line", "ink")]
     for row, (kind, label, role, symbol) in enumerate(KINDS):
-        own = [a for a in context.activities if a.kind == kind]
-        if own:
-            x = np.array([a.start + 0.5 * a.seconds for a in own]) / 3600.0
+        activities = [a for a in context.activities if a.kind == kind]
+        if activities:
+            x = np.array([a.start + 0.5 * a.seconds for a in activities]) / 3600.0
             y = np.full(x.shape, low - (0.08 + 0.06 * row) * span)
-            lasting = np.array([(a.start, a.start + a.seconds, np.nan) for a in own]).ravel() / 3600.0
+            lasting = np.array([(a.start, a.start + a.seconds, np.nan) for a in activities]).ravel() / 3600.0
             traces.append(Trace("", lasting, np.repeat(y, 3), "line", role, width=5.0, legend=False))
-            texts = tuple(f"{label}: {a.step.pose.name}" for a in own)
+            texts = tuple(f"{label}: {a.step.pose.name}" for a in activities)
             traces.append(Trace(label, x, y, role=role, symbol=symbol, size=5.0, texts=texts))
     plot = Plot("", PlotAxis("station time / h"), PlotAxis("temperature / °C"), tuple(traces))
     return Chart("Temperatures and records over the station's time", (plot,), height=340)
@@ -149,7 +149,7 @@ def alias_chart(context: PlanContext) -> Chart | None:
     row = size - 1.0 - row
     cells = Trace("cosine", column, row, symbol="square", size=CELL - 3.0, colour=value, legend=False)
     marked = (value > CONFOUNDED) & (size - 1.0 - row != column)
-    signs = tuple("=" if one > ALIKE else "≈" for one in value[marked])
+    signs = tuple("=" if cosine > ALIKE else "≈" for cosine in value[marked])
     traces = (cells, Trace("", column[marked], row[marked], "labels", "ink", texts=signs, legend=False))
     across = PlotAxis("", names=labels, low=-0.6, high=size - 0.4)
     along = PlotAxis("", names=labels[::-1], low=-0.6, high=size - 0.4)
@@ -158,7 +158,7 @@ def alias_chart(context: PlanContext) -> Chart | None:
 
 
 def _grouped(cosines: Array) -> list[int]:
-    """Order of rows in which each follows the one it is most confounded with."""
+    """Order of rows in which each follows the effect that it is most confounded with."""
     like = np.maximum(cosines, cosines.T)
     left = set(range(len(like)))
     order = [0]
@@ -170,10 +170,10 @@ def _grouped(cosines: Array) -> list[int]:
 def sight_chart(effects: list[dict[str, Any]]) -> Chart:
     """Remaining fraction v of every effect by axis."""
     shown = sorted(effects, key=lambda row: row["left"])
-    place = np.arange(len(shown), dtype=float)
+    heights = np.arange(len(shown), dtype=float)
     fractions = np.array([row["left_by_axis"] for row in shown]).T
     traces = [
-        Trace(f"sensor axis {axis}", left, place + 0.2 * (1 - k), role=axis)
+        Trace(f"sensor axis {axis}", left, heights + 0.2 * (1 - k), role=axis)
         for k, (axis, left) in enumerate(zip(AXES, fractions, strict=False))
     ]
     across = PlotAxis("v, fraction of the effect that remains after the model", low=-0.02, high=1.02)

@@ -48,5 +48,5 @@ def _group(members: list[tuple[str, str, str]]) -> ReasonGroup:
     differ = [len(set(column)) > 1 for column in zip(*numbers, strict=True)]
     open_, first = iter(differ), members[0][1]
     text = _NUMBER.sub(lambda number: "…" if next(open_) else number[0], first)
-    own = [", ".join(value for value, apart in zip(row, differ, strict=True) if apart) for row in numbers]
-    return ReasonGroup(text, [(unit, value or other) for (unit, _, value), other in zip(members, own, strict=True)])
+    varying = [", ".join(value for value, apart in zip(row, differ, strict=True) if apart) for row in numbers]
+    return ReasonGroup(text, [(unit, value or other) for (unit, _, value), other in zip(members, varying, strict=True)])

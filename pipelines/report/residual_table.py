@@ -44,8 +44,8 @@ class ResidualTable:
         """The selection by a click on a point."""
         return f"{self.units[unit]}:{int(self.dwells[dwell])}"
 
-    def place_of(self, unit: str) -> int:
-        """Place of a unit; that of the one with the largest residuals for a name that is not in the table."""
+    def index_of(self, unit: str) -> int:
+        """Index of a unit; that of the unit with the largest residuals for a name that is not in the table."""
         if unit in self.units:
             return self.units.index(unit)
         return int(np.nanargmax(np.nanmean(self.residual**2, axis=(1, 2))))
@@ -69,8 +69,8 @@ def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str
         slot = np.asarray(state.slot, dtype=float)
         drivers["slot"] = ("slot", np.broadcast_to(slot.reshape(len(units), -1)[:, :1], shape).copy())
     of_effect, named = residuals.quantities_of_added(diagnosis)
-    drivers = {one.name: (one.label, one.values) for one in of_effect if one.name != "force"} | drivers  # noqa: PD011
-    first = next((name for name in (*(one.name for one in of_effect), *named) if name in drivers), "")
+    drivers = {row.name: (row.label, row.values) for row in of_effect if row.name != "force"} | drivers  # noqa: PD011
+    first = next((name for name in (*(row.name for row in of_effect), *named) if name in drivers), "")
     turning = np.zeros(shape, dtype=np.int64)
     if state.temperature is not None:
         turning = np.stack([direction(row) for row in state.temperature])

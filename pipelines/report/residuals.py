@@ -31,7 +31,7 @@ class LotResiduals:
     """Residuals of a lot in µg, (units, axes, n); NaN where a dwell is missing.
 
     axes : "x", "y", "z", or "norm" alone
-    shown : place of the unit whose residuals fall most, or are largest if nothing was added
+    shown : index of the unit whose residuals fall most, or are largest if nothing was added
     """
 
     units: tuple[str, ...]
@@ -54,7 +54,7 @@ class LotResiduals:
 
 @dataclass(frozen=True)
 class DriverValues:
-    """A driver's values (units, n), or (units, n, 3) where it is one per axis, with a label for people.
+    """A driver's values (units, n), or (units, n, 3) where each axis has values, with a label for people.
 
     period : of a swing that the residual follows, in the unit of the values; None of another curve
     """
@@ -96,7 +96,7 @@ LABELS = axis_labels() | {"approach": "change of force at the move before / g"}
 
 
 def recorded_quantities(problem: Problem) -> list[DriverValues]:
-    """What was recorded with the dwells of a lot, in the units that people read."""
+    """The quantities recorded with the dwells of a lot, in the units of display."""
     state = problem.lot.state
     quantities: list[DriverValues] = []
     for driver in drivers_of(problem):
@@ -109,7 +109,7 @@ def recorded_quantities(problem: Problem) -> list[DriverValues]:
 
 
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
-    """Drivers with a picture: those of the added effects, those that the residual follows, then the usual ones if they vary."""
+    """Drivers with a picture: those of the added effects, those that the residual follows, then usual drivers if they vary."""
     known = {quantity.name: quantity for quantity in recorded_quantities(diagnosis.problem)}
     forces, named = quantities_of_added(diagnosis)
     unknown = diagnosis.unexplained
@@ -131,7 +131,7 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
 def quantities_of_added(diagnosis: Diagnosis) -> tuple[list[DriverValues], list[str]]:
     """The force, or the angles of the table, where an added effect depends on them; and names of its other quantities.
 
-    An effect of a device is seen over the force along its axis, one of the station over the angles.
+    An effect of a device is seen over the force along its axis, an effect of the station over the angles.
     """
     problem = diagnosis.problem
     state = problem.lot.state
@@ -143,8 +143,8 @@ def quantities_of_added(diagnosis: Diagnosis) -> tuple[list[DriverValues], list[
     if of_angles and any(isinstance(effect, StationEffect) and "force" in names for effect, names in drivers):
         for name, values in (("outer_deg", state.outer), ("inner_deg", state.inner)):
             if values is not None and float(np.ptp(values)) > 0.0:
-                whole = np.broadcast_to(np.degrees(values), (problem.lot.output.shape[0], problem.n))
-                series.append(DriverValues(name, LABELS.get(name, name), whole))
+                degrees = np.broadcast_to(np.degrees(values), (problem.lot.output.shape[0], problem.n))
+                series.append(DriverValues(name, LABELS.get(name, name), degrees))
     if not problem.lot.radial and any(
         not isinstance(effect, StationEffect) and "force" in names for effect, names in drivers
     ):
@@ -156,11 +156,11 @@ def quantities_of_added(diagnosis: Diagnosis) -> tuple[list[DriverValues], list[
     return series, [columns[name] for _, names in drivers for name in sorted(names) if name in columns]
 
 
-def _alike(one: Array, other: Array) -> bool:
+def _alike(driver: Array, other: Array) -> bool:
     """Whether two drivers are equivalent, as elapsed time and time since power-on often are."""
-    if one.shape != other.shape:
+    if driver.shape != other.shape:
         return False
-    return bool(abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) > _ALIKE)
+    return bool(abs(np.corrcoef(driver.ravel(), other.ravel())[0, 1]) > _ALIKE)
 
 
 def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[str]:

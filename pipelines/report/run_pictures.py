@@ -34,19 +34,19 @@ def model_chart(dwells: pd.DataFrame, residuals: pd.DataFrame) -> Chart:
     across = PlotAxis(RESIDUAL, low=-largest, high=largest)
     rows: list[list[Plot]] = [[], []]
     for axis in axes_among(residuals["axis"]):
-        own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", "soak"]], on="dwell")
-        force, left = own["force_g"].to_numpy(float), own["residual_ug"].to_numpy(float)
-        colour = None if scale is None else own["soak"].map(_soak_means(dwells)).to_numpy(float)
+        of_axis = residuals[residuals["axis"] == axis].merge(dwells[["dwell", "soak"]], on="dwell")
+        force, left = of_axis["force_g"].to_numpy(float), of_axis["residual_ug"].to_numpy(float)
+        colour = None if scale is None else of_axis["soak"].map(_soak_means(dwells)).to_numpy(float)
         along = PlotAxis(f"specific force on {axis} / g"), PlotAxis(axis_labels()["unit_C"])
         titles = f"axis {axis}", ""
-        for row, title, x, label in zip(rows, titles, (force, own["unit_C"].to_numpy(float)), along, strict=True):
-            points = Trace("residual", x, left, size=POINT, colour=colour, texts=_told(own), legend=False)
+        for row, title, x, label in zip(rows, titles, (force, of_axis["unit_C"].to_numpy(float)), along, strict=True):
+            points = Trace("residual", x, left, size=POINT, colour=colour, texts=_told(of_axis), legend=False)
             row.append(Plot(title, label, across, (level(x, 0.0, dashed=False), points)))
     return Chart("Model and measurement", (*rows[0], *rows[1]), len(rows[0]), scale, height=250)
 
 
 def quantities(residuals: pd.DataFrame, dwells: pd.DataFrame) -> dict[str, str]:
-    """What the residuals of a unit can be drawn against, by name, with the label: force, time, what was recorded, pose.
+    """Quantities against which residuals of a unit can be drawn, by name, with label: force, time, what was recorded, pose.
 
     Of what was recorded, that which varied between its dwells.
     """
@@ -63,11 +63,13 @@ def quantities(residuals: pd.DataFrame, dwells: pd.DataFrame) -> dict[str, str]:
 
 def follows_most(residuals: pd.DataFrame, dwells: pd.DataFrame) -> str:
     """The quantity that the residuals of a unit depend on most; the mean over its axes decides."""
-    axes = [own for _, own in timed(residuals, dwells).groupby("axis")]
+    axes = [of_axis for _, of_axis in timed(residuals, dwells).groupby("axis")]
 
     def share(name: str) -> float:
         column = COLUMNS.get(name, name)
-        return sum(followed(own[column].to_numpy(float), own["residual_ug"].to_numpy(float)) for own in axes)
+        return sum(
+            followed(of_axis[column].to_numpy(float), of_axis["residual_ug"].to_numpy(float)) for of_axis in axes
+        )
 
     # a clock beside the time says nothing else, and neither does a pose beside its force
     return max((name for name in quantities(residuals, dwells) if name != POSE and not is_clock(name)), key=share)
@@ -75,8 +77,8 @@ def follows_most(residuals: pd.DataFrame, dwells: pd.DataFrame) -> str:
 
 def timed(residuals: pd.DataFrame, dwells: pd.DataFrame) -> pd.DataFrame:
     """Residuals with what was recorded at their dwells."""
-    own = _with_rate(dwells)
-    return residuals.merge(own[["dwell", *own.columns.difference(residuals.columns)]], on="dwell", how="left")
+    recorded = _with_rate(dwells)
+    return residuals.merge(recorded[["dwell", *recorded.columns.difference(residuals.columns)]], on="dwell", how="left")
 
 
 def _with_rate(dwells: pd.DataFrame) -> pd.DataFrame:
@@ -104,15 +106,15 @@ def _residuals(title: str, residuals: pd.DataFrame, against: tuple[str, str], si
     column = COLUMNS.get(quantity, quantity)
     traces: list[Trace] = []
     for axis in axes_among(residuals["axis"]):
-        own = residuals[residuals["axis"] == axis]
-        y, role = own["residual_ug"].to_numpy(float), cast("Role", axis)
+        of_axis = residuals[residuals["axis"] == axis]
+        y, role = of_axis["residual_ug"].to_numpy(float), cast("Role", axis)
         if quantity == POSE:
-            x = np.array([poses.index(str(pose)) + POSE_SHIFT[axis] for pose in own["pose"]])
+            x = np.array([poses.index(str(pose)) + POSE_SHIFT[axis] for pose in of_axis["pose"]])
         else:
-            x = own[column].to_numpy(float) * shown_factor(column)
-        picks = _picks(unit, own) if unit else ()
-        error = BOTH_SIDES * own["expected_ug"].to_numpy(float) if unit and "expected_ug" in own else None
-        traces.append(Trace(f"axis {axis}", x, y, role=role, size=size, texts=_told(own), picks=picks, error=error))
+            x = of_axis[column].to_numpy(float) * shown_factor(column)
+        picks = _picks(unit, of_axis) if unit else ()
+        error = BOTH_SIDES * of_axis["expected_ug"].to_numpy(float) if unit and "expected_ug" in of_axis else None
+        traces.append(Trace(f"axis {axis}", x, y, role=role, size=size, texts=_told(of_axis), picks=picks, error=error))
         traces += [] if quantity == POSE else smooth(axis, x, y, role)
     zero = level(np.concatenate([trace.x for trace in traces]), 0.0, dashed=False)
     names = tuple(poses) if quantity == POSE else ()
@@ -169,9 +171,9 @@ def allan_plot(allan: pd.DataFrame, title: str = "") -> Plot:
     """Allan deviation with its 68 % band, the fitted noise terms, and slopes −½ and +½ as guides."""
     traces: list[Trace] = []
     for axis in axes_among(allan["axis"]):
-        own = allan[allan["axis"] == axis].sort_values("tau_s")
+        curve = allan[allan["axis"] == axis].sort_values("tau_s")
         tau, deviation, low, high, fitted = (
-            own[name].to_numpy(float) for name in ("tau_s", "deviation_ug", "low_ug", "high_ug", "fitted_ug")
+            curve[name].to_numpy(float) for name in ("tau_s", "deviation_ug", "low_ug", "high_ug", "fitted_ug")
         )
         names = f"{axis}: 68 % interval", f"axis {axis}", f"{axis}: fitted terms"
         traces += measured_curve(names, cast("Role", axis), tau, deviation, (low, high), fitted)
@@ -203,14 +205,16 @@ def lot_chart(verification: pd.DataFrame, poses: pd.DataFrame, units: list[str],
     single, means = [np.zeros((2, 0))], [np.zeros((2, 0))]
     texts: list[str] = []
     for position, unit in enumerate(units):
-        own, dwells = poses[poses["unit"] == unit], verification[verification["unit"] == unit]
-        names = own["pose"].tolist()
-        places = np.linspace(-0.25, 0.25, len(names)).tolist() if len(names) > 1 else [0.0]
-        spread = dict(zip(names, places, strict=True))
+        of_unit, dwells = poses[poses["unit"] == unit], verification[verification["unit"] == unit]
+        names = of_unit["pose"].tolist()
+        offsets = np.linspace(-0.25, 0.25, len(names)).tolist() if len(names) > 1 else [0.0]
+        spread = dict(zip(names, offsets, strict=True))
         among = [position + spread[pose] for pose in dwells["pose"]]
         single.append(np.array([among, dwells["error_ug"]], dtype=float))
-        means.append(np.array([[position + place for place in places], own["error_ug"]], dtype=float))
-        texts += [f"{unit}, pose {pose}: {value:.4g} µg" for pose, value in zip(names, own["error_ug"], strict=True)]
+        means.append(np.array([[position + offset for offset in offsets], of_unit["error_ug"]], dtype=float))
+        texts += [
+            f"{unit}, pose {pose}: {value:.4g} µg" for pose, value in zip(names, of_unit["error_ug"], strict=True)
+        ]
     x, y = np.concatenate(means, axis=1)
     beyond = np.abs(y) > limit_ug
     traces = [Trace("single dwell", *np.concatenate(single, axis=1), role="muted", size=3.5)]
@@ -277,11 +281,11 @@ def station_chart(history: pd.DataFrame, readings: pd.DataFrame, events: pd.Data
         texts = tuple(f"{row.kind}: {row.reason}" for row in marked.itertuples())
         lowest = np.full(len(marked), float(np.nanmin(chamber)))
         traces.append(Trace("events", when, lowest, role="limit", symbol="diamond", size=10.0, texts=texts))
-    own = readings.drop_duplicates("record").sort_values("start_s")
-    start = own["start_s"].to_numpy(float) / 3600.0
+    records = readings.drop_duplicates("record").sort_values("start_s")
+    start = records["start_s"].to_numpy(float) / 3600.0
     angles = (
-        Trace("outer", start, own["outer_deg"].to_numpy(float), role="z", size=4.0),
-        Trace("inner", start, own["inner_deg"].to_numpy(float), role="fourth", symbol="square", size=4.0),
+        Trace("outer", start, records["outer_deg"].to_numpy(float), role="z", size=4.0),
+        Trace("inner", start, records["inner_deg"].to_numpy(float), role="fourth", symbol="square", size=4.0),
     )
     span = PlotAxis("station time / h", low=0.0, high=float(max(hours[-1], start[-1])))
     plots = (

@@ -21,11 +21,11 @@ def smooth(name: str, x: Array, y: Array, role: Role, period: float | None = Non
 
 
 def band(x: Array, y: Array, period: float | None = None) -> tuple[Array, Array, Array]:
-    """Smooth curve through points with its 95 % band: (places, low, high); empty where there are too few.
+    """Smooth curve through points with its 95 % band: (abscissas, low, high); empty where there are too few.
 
     Parameters
     ----------
-    period : of a swing that the points follow, in the unit of x; then the curve is one
+    period : of a swing that the points follow, in the unit of x; then the curve is such a swing
     """
     there = np.isfinite(x) & np.isfinite(y)
     x, y = x[there], y[there]
@@ -33,8 +33,8 @@ def band(x: Array, y: Array, period: float | None = None) -> tuple[Array, Array,
         return np.zeros(0), np.zeros(0), np.zeros(0)
     groups = _groups(x)
     places = np.linspace(x.min(), x.max(), 200 if period else 80) if period or groups > 3 else np.unique(x)
-    whole = np.concatenate([x, places])
-    both = _swing(whole, period) if period else _basis(whole, x.size, groups)
+    abscissa = np.concatenate([x, places])
+    both = _swing(abscissa, period) if period else _basis(abscissa, x.size, groups)
     design, at = both[: x.size], both[x.size :]
     coefficients, _, rank, _ = np.linalg.lstsq(design, y, rcond=1e-9)
     left = y - design @ coefficients

@@ -16,13 +16,13 @@ from pipelines.stages.figures import figure_label
 def _environment() -> Environment:
     loader = FunctionLoader(lambda part: (files("pipelines.report") / part).read_text(encoding="utf-8"))
     made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    own: dict[str, Any] = {"plain_name": plain_name, "figure_label": figure_label}
-    made.globals.update(own)
+    names: dict[str, Any] = {"plain_name": plain_name, "figure_label": figure_label}
+    made.globals.update(names)
     return made
 
 
 def plain_name(effect_id: str) -> str:
-    """What an effect is, in a few words for readers of a page; empty for an id that is not of the catalogue."""
+    """The plain name of an effect, for readers of a page; empty for an id that is not of the catalogue."""
     if effect_id not in effects.catalogue():
         return ""
     text = (type(effects.get(effect_id)).__doc__ or "").strip().splitlines()[:1]

@@ -25,8 +25,8 @@ def diff(a: Run, b: Run) -> dict[str, Any]:
     Raises DataRejected: the runs have no unit in common, or nothing to compare.
     """
     coefficients = changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
-    own, its = (with_standard_error(one.about, _table(one, "figures")) for one in (a, b))
-    figures = changed(own, its, FIGURE, "standard_error")
+    figures_a, figures_b = (with_standard_error(run.about, _table(run, "figures")) for run in (a, b))
+    figures = changed(figures_a, figures_b, FIGURE, "standard_error")
     before, after = _grades(a), _grades(b)
     if before.keys().isdisjoint(after):
         raise DataRejected(
@@ -114,7 +114,7 @@ def _units(
     rows: list[dict[str, Any]] = []
     for unit in (unit for unit in before if unit in after):
         pairs = {key: [before[unit][key], after[unit][key]] for key in ("outcome", "grade", "reasons")}
-        differs = {key: one != other for key, (one, other) in pairs.items()}
+        differs = {key: first != other for key, (first, other) in pairs.items()}
         flipped = differs["outcome"] or differs["grade"]
         head = {"unit": unit, "flipped": flipped, "changed": flipped or unit in moved or differs["reasons"]}
         rows.append({**head, **pairs, "largest_over_both": float(largest.get(unit, 0.0))})
@@ -172,7 +172,9 @@ def _chosen(a: Run, b: Run) -> list[dict[str, Any]]:
         rows.append(_row("model", "", _model_text(*models), _model_text(*reversed(models))))
     if limits[0] != limits[1]:
         first, second = (limit or {} for limit in limits)
-        rows.append(_row("limits", _limits_text(first, second), *(one.get("name", "none") for one in (first, second))))
+        rows.append(
+            _row("limits", _limits_text(first, second), *(limit.get("name", "none") for limit in (first, second)))
+        )
     return rows
 
 
@@ -182,12 +184,12 @@ def _model(run: Run) -> dict[str, Any]:
     return {"effects": effects, "formulas": recipe.get("formulas", []) if effects else []}
 
 
-def _model_text(own: dict[str, Any], other: dict[str, Any]) -> str:
+def _model_text(model: dict[str, Any], other: dict[str, Any]) -> str:
     """A short text for a model: its effects beyond the other model, or all its effects where neither contains the other."""
-    more = [effect for effect in own["effects"] if effect not in other["effects"]]
-    if more or len(own["effects"]) < len(other["effects"]):
-        return " + ".join([f"{len(own['effects']) - len(more)} effects", *more])
-    return ", ".join(own["effects"]) or "none"
+    more = [effect for effect in model["effects"] if effect not in other["effects"]]
+    if more or len(model["effects"]) < len(other["effects"]):
+        return " + ".join([f"{len(model['effects']) - len(more)} effects", *more])
+    return ", ".join(model["effects"]) or "none"
 
 
 def _limits_text(before: dict[str, Any], after: dict[str, Any]) -> str:
@@ -200,7 +202,7 @@ def _limits_text(before: dict[str, Any], after: dict[str, Any]) -> str:
 
 def _manifests(a: Run, b: Run) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
     """Manifests of every stage that both runs have, in the order of the chain."""
-    first, second = ({one["stage"]: one for one in map(run.manifest, run.tables())} for run in (a, b))
+    first, second = ({manifest["stage"]: manifest for manifest in map(run.manifest, run.tables())} for run in (a, b))
     return {stage: (first[stage], second[stage]) for stage in ORDER if stage in first and stage in second}
 
 

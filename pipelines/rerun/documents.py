@@ -51,7 +51,7 @@ class FigureDifference(ValueDifference):
 
 
 class CauseOfDifference(TypedDict):
-    """What is not the same in two runs."""
+    """What differs between two runs."""
 
     what: Annotated[str, "data, code, model, limits or library"]
     stage: NotRequired[str]
@@ -90,7 +90,7 @@ LotFigures = TypedDict(
 
 
 class GroupFigures(LotFigures):
-    """The same of one kind of device on one station."""
+    """The figures of the lots of one kind of device on one station."""
 
     station: str
     device: str

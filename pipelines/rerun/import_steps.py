@@ -40,7 +40,7 @@ class StageCall:
 
 @dataclass(frozen=True)
 class ImportedData:
-    """What was imported, as the stages need it.
+    """The properties of imported data that decide on the stages.
 
     history : whether temperatures between the dwells were; known : whether the poses are known, otherwise only the norm of
     gravity is; gravity : where it was measured, g
@@ -60,7 +60,7 @@ class ImportedData:
 
 
 def imported(run: Run, dwells: pd.DataFrame) -> ImportedData:
-    """What a run was imported with."""
+    """The properties of the data of an imported run."""
     return ImportedData("history" in run.tables(), has_poses(dwells), gravity_of_import(run.about))
 
 
@@ -94,7 +94,7 @@ def import_step(data: ImportedData, left_out: Dwells, old: Run) -> StageCall:
     names = data.read()
     if not left_out:
         return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
-    parameters = {"left_out": [list(one) for one in left_out], "dwells": old.manifest("dwells")["sha256"]}
+    parameters = {"left_out": [list(pair) for pair in left_out], "dwells": old.manifest("dwells")["sha256"]}
 
     def call(_: Run) -> Tables:
         return {**{name: old.table(name) for name in names}, "dwells": leave_out(old.table("dwells"), left_out)}

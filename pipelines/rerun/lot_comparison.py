@@ -52,7 +52,7 @@ class Side:
 class LotComparison:
     """A lot under the old and the new model.
 
-    sides : the old and the new one; none where the lot could not be judged
+    sides : under the old and the new model; none where the lot could not be judged
     """
 
     entry: SelectedRun
@@ -117,7 +117,7 @@ def _side(tables: Mapping[str, pd.DataFrame], calibration: Calibration | None) -
 def _sums(table: pd.DataFrame, column: str) -> Sums:
     rows = ByUnit(table)
     errors = ((unit, rows.of(unit)[column]) for unit in rows.units)
-    return {unit: (float(np.sum(own**2)), len(own)) for unit, own in errors}
+    return {unit: (float(np.sum(error**2)), len(error)) for unit, error in errors}
 
 
 def fresh(tasks: Sequence[FreshTask]) -> list[Fresh]:
@@ -139,8 +139,8 @@ def applied(calibration: Calibration, units: Sequence[str], dwells: pd.DataFrame
 
     The norm needs no angle, so a unit that sits in another slot of another station is judged by it, too.
     """
-    own = dwells[dwells["unit"].isin(set(units) & set(calibration.units))]
-    lots = (part.fitted_kinds for part in LotTables(own, history).parts)
+    chosen = dwells[dwells["unit"].isin(set(units) & set(calibration.units))]
+    lots = (part.fitted_kinds for part in LotTables(chosen, history).parts)
     return {unit: sums for lot in lots for unit, sums in _applied(calibration, lot).items()}
 
 
@@ -151,4 +151,4 @@ def _applied(calibration: Calibration, lot: LotArrays) -> Sums:
         calibration.effects, state, lot.output, calibration.coefficients[order], carried_over(calibration.nonlinear)
     )
     error = MICRO * (np.linalg.norm(force, axis=-1) - np.linalg.norm(lot.state.force, axis=-1))
-    return {unit: (float(np.sum(own**2)), own.size) for unit, own in zip(lot.units, error, strict=True)}
+    return {unit: (float(np.sum(errors**2)), errors.size) for unit, errors in zip(lot.units, error, strict=True)}

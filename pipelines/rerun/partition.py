@@ -28,7 +28,7 @@ class Batch:
 def parts(
     archive: Archive, runs: Sequence[str], change: ModelChange, workers: int, *, report: bool = False
 ) -> list[Batch]:
-    """The runs in batches, several for each worker; the same runs give the same batches."""
+    """The runs in batches, several for each worker; equal runs give equal batches."""
     size = min(MOST, max(1, -(-len(runs) // (4 * max(workers, 1)))))
     batches = [tuple(runs[start : start + size]) for start in range(0, len(runs), size)]
     return [Batch(archive.address, batch, change, report) for batch in batches]
@@ -48,7 +48,7 @@ Result = TypeVar("Result")
 
 
 def _each(part: Batch, call: Callable[[Archive, str], Result], failed: Callable[..., Result]) -> list[Result]:
-    """What a call makes of every run of a batch; a run that fails has an error, the others continue."""
+    """The results of a call for every run of a batch; a run that fails gives an error, the others continue."""
     archive, results = Archive(part.archive), list[Result]()
     for run_id in part.runs:
         try:

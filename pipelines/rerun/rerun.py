@@ -1,4 +1,4 @@
-"""One run of the archive again: only the stages whose key changed, into a new run; the old one stays as it is."""
+"""One run of the archive again: only the stages whose key changed, into a new run; the old run is not changed."""
 
 import time
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ samples it reads are not in the archive; worked out."""
 
 @dataclass(frozen=True)
 class RerunOutcome:
-    """What became of one run, also in the JSON document: its re-run, what had changed, and how every stage came about."""
+    """The outcome of one run, also in the JSON document: its re-run, what had changed, and how every stage came about."""
 
     run: str
     new: Annotated[str, "id of the re-run; the run's own if nothing changed, empty if it failed"] = ""
@@ -40,7 +40,7 @@ class RerunOutcome:
 def again(
     archive: Archive, run_id: str, change: ModelChange, *, report: bool = False, left_out: Dwells = ()
 ) -> RerunOutcome:
-    """Run an archived run again. A new run is published when all of it is there: one that fails or is stopped leaves nothing.
+    """Run an archived run again. A new run is published when all of it is there: a run that fails or is stopped leaves nothing.
 
     Raises DataRejected: the run cannot be run again: its capture is not finished, or samples are needed that are not in the
         archive.
@@ -66,7 +66,7 @@ def again(
             stages = _done(old, new, plan, raw=raw)
             with alone(new.path, wait=True):
                 files.sweep(new.path)
-                if (new.path / START).is_file():  # another process did the same meanwhile, with the same bytes
+                if (new.path / START).is_file():  # another process made this run meanwhile, with the same bytes
                     new.forget()
                 new.flush(last=START)
         with alone(new.path, wait=True):
@@ -80,7 +80,7 @@ def again(
 
 
 def _done(old: Run, new: BufferedRun, plan: Plan, *, raw: bool) -> dict[str, str]:
-    """What became of every stage."""
+    """The outcome of every stage (computed, reused or kept), by name."""
     work = StageRunner(old, new, raw=raw)
     return {step.name: work.do(step) for step in plan.steps}
 
@@ -113,9 +113,9 @@ def has_static_record(run: Run) -> bool:
 
 
 def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
-    """What a re-run would do otherwise than the run did: by stage, ``code``, ``model``, ``limits`` or another parameter.
+    """The differences of a re-run from the run: by stage, ``code``, ``model``, ``limits`` or another parameter.
 
-    raw : whether the raw samples are there; without them the stages that read them are kept as they are
+    raw : whether the raw samples are there; without them the tables of the stages that read them are reused
     """
     rows: list[dict[str, str]] = []
     there = set(old.tables())
@@ -124,8 +124,8 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
             named = ", ".join(f"{unit}:{dwell}" for unit, dwell in step.parameters["left_out"])
             rows.append(_change(step.name, "dwells left out", "", named))
             continue
-        kept = step.name in {"capture", "import"} or (step.name in FROM_SAMPLES and not raw)
-        if kept or not there.issuperset(step.outputs):
+        given = step.name in {"capture", "import"} or (step.name in FROM_SAMPLES and not raw)
+        if given or not there.issuperset(step.outputs):
             continue
         manifest = old.manifest(step.outputs[0])
         if manifest.get("code") != step.code:
@@ -136,8 +136,8 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
             for key, value in step.parameters.items()
             if key in before and before[key] != value
         ]
-    whole = {name for step in plan.steps for name in step.outputs}
-    if there >= {"dwells"} and not whole <= there and not old.about.get("capture"):
+    planned = {name for step in plan.steps for name in step.outputs}
+    if there >= {"dwells"} and not planned <= there and not old.about.get("capture"):
         rows.append(_change("fit", "not fitted yet", "", ""))
     return rows
 
@@ -166,7 +166,7 @@ class StageRunner:
         self._before = set(old.tables())
 
     def do(self, step: StageCall) -> str:
-        """What became of a stage; its outputs are in the new run now."""
+        """Run or reuse a stage, so that its outputs are in the new run; return its outcome."""
         if step.name == "import" or (step.name in {"capture", *FROM_SAMPLES} and not self.raw):
             return self._keep(step)
         inputs = {name: self._hash(name) for name in step.inputs}

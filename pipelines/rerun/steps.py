@@ -64,7 +64,7 @@ class ArchivedJob(Job):
 
     @property
     def about(self) -> dict[str, Any]:
-        """What is kept beside the run for readers."""
+        """The content of ``run.json`` that describes the run to readers."""
         decided = {"recipe": self.recipe.model_dump(mode="json"), "limits": self.limits.model_dump(mode="json")}
         return {**self.run_document, **decided, "lot": self.lot.model_dump(mode="json")}
 
@@ -72,7 +72,7 @@ class ArchivedJob(Job):
 def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
     """The job of a captured run, with another model or other limits where they are given."""
     about, keys = run.about, model_keys(change)
-    if keys:  # the prior of another model is none of this one
+    if keys:  # the prior of another model does not fit this model
         about["recipe"]["prior"] = None
         about.pop("prior", None)
     try:
@@ -92,7 +92,7 @@ def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
 
 
 def without_provenance(about: dict[str, Any]) -> dict[str, Any]:
-    """What ``run.json`` holds, without who made it, where and when."""
+    """The content of ``run.json`` without author, host and time."""
     return {key: value for key, value in about.items() if key not in PROVENANCE}
 
 
@@ -107,15 +107,15 @@ FROM_SAMPLES = (
     "validate",
     "reduce",
     "soak_noise",
-)  # stages whose tables are kept where the raw samples are no longer there
+)  # stages whose tables are reused where the raw samples are no longer there
 RAW = (*FROM_SAMPLES, "noise")  # stages that read the raw samples
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All that is to be done to a run.
+    """The stages of a re-run, in order.
 
-    name : begins the new run's name; about : what it is kept with; decisive : what its result depends on
+    name : begins the new run's name; about : the content of its ``run.json``; decisive : what its result depends on
     """
 
     name: str
@@ -125,7 +125,7 @@ class Plan:
 
 
 def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
-    """What is to be done to a run, with another model or other limits where they are given.
+    """The plan of a re-run, with another model or other limits where they are given.
 
     left_out : dwells of an import that are left out, as (unit, dwell)
     """
@@ -139,9 +139,9 @@ def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
 def _captured(run: Run, change: ModelChange) -> Plan:
     job = archived_job(run, change)
     steps = [_capture_step(run, job)]
-    whole = run.records is not None and run.records.is_complete()
+    complete = run.records is not None and run.records.is_complete()
     for stage in STAGES:
-        if stage.name == "soak_noise" and not whole and stage.outputs[0] not in run.tables():
+        if stage.name == "soak_noise" and not complete and stage.outputs[0] not in run.tables():
             continue  # a run of an earlier version whose samples are gone
         parameters, code, call = stage.parameters(job), code_hash(stage.name), partial(stage.call, job)
         steps.append(StageCall(stage.name, stage.inputs, stage.outputs, parameters, code, call))
@@ -150,7 +150,7 @@ def _captured(run: Run, change: ModelChange) -> Plan:
 
 
 def _capture_step(run: Run, job: ArchivedJob) -> StageCall:
-    """What the run keeps of its capture: all that it has, which for runs of earlier versions is less than today."""
+    """The step that takes over the tables of the capture: those that the run has, fewer for runs of earlier versions."""
     there = run.tables()
     more = tuple(name for name in ("events", "soaks") if name in there or "readings" not in there)
 
@@ -207,12 +207,12 @@ def _import_plan(
     more: dict[str, Any],
     depends: dict[str, Any],
 ) -> Plan:
-    """The plan of an import: what it is kept with, and what its result depends on, have the dwells that are left out."""
+    """The plan of an import; its ``run.json`` and its key state the dwells that are left out."""
     about = run.about
     named = [f"{unit}:{dwell}" for unit, dwell in left_out]
     noted = {"left_out": [*about.get("left_out", []), *named]} if left_out else {}
-    kept = {"recipe": {**about.get("recipe", {}), "name": "import", **recipe}, **more}
-    return Plan("import", tuple(steps), {**without_provenance(about), **kept, **noted}, {**depends, **noted})
+    about_import = {"recipe": {**about.get("recipe", {}), "name": "import", **recipe}, **more}
+    return Plan("import", tuple(steps), {**without_provenance(about), **about_import, **noted}, {**depends, **noted})
 
 
 def _fit_for_a_fit(run: Run) -> pd.DataFrame:

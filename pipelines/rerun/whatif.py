@@ -67,7 +67,7 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange
         earlier: dict[str, list[str]] = defaultdict(list)
         capture = judged.entry.capture
         for unit in judged.sides[1].fitted:
-            # the dwells of a run are not fresh for another one of the same capture
+            # the dwells of a run are not fresh for another run of the same capture
             if unit in last and not (capture and last[unit].entry.capture == capture):
                 earlier[last[unit].entry.id].append(unit)
             last[unit] = judged
@@ -80,22 +80,22 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange
 
 def summary(lots: Sequence[LotComparison], later: Sequence[Fresh]) -> dict[str, Any]:
     """The what-if as a document: total, by station and device, changed outcomes, failed lots, and a verdict."""
-    by_run = {one.run: one for one in later}
-    whole = [judged for judged in lots if judged.sides]
+    by_run = {fresh.run: fresh for fresh in later}
+    compared = [judged for judged in lots if judged.sides]
     groups: dict[tuple[str, str], list[LotComparison]] = defaultdict(list)
-    for judged in whole:
+    for judged in compared:
         groups[judged.entry.station, judged.entry.device].append(judged)
     rows = [
-        {"station": station, "device": device, **_figures(own, by_run)}
-        for (station, device), own in sorted(groups.items())
+        {"station": station, "device": device, **_figures(members, by_run)}
+        for (station, device), members in sorted(groups.items())
     ]
-    total = _figures(whole, by_run)
-    verdict, explanation = _verdict(total, rows, whole, by_run)
+    total = _figures(compared, by_run)
+    verdict, explanation = _verdict(total, rows, compared, by_run)
     return {
-        "lots": len(whole),
+        "lots": len(compared),
         "total": total,
         "groups": rows,
-        "flips": _flips(whole),
+        "flips": _flips(compared),
         "failed": [{"run": judged.entry.id, "error": judged.error} for judged in lots if judged.error],
         "verdict": verdict,
         "words": explanation,
@@ -106,17 +106,17 @@ def _figures(lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> dict[str
     """Yield and root mean square errors of some lots, each [old, new]."""
     sides = [[judged.sides[k] for judged in lots] for k in (0, 1)]
     again = [fresh[judged.entry.id] for judged in lots if judged.entry.id in fresh]
-    on_fresh = [[one.old for one in again], [one.new for one in again]]
+    on_fresh = [[lot.old for lot in again], [lot.new for lot in again]]
     units = sum(len(side.outcome) for side in sides[0])
-    passed = [sum(list(side.outcome.values()).count("pass") for side in own) for own in sides]
+    passed = [sum(list(side.outcome.values()).count("pass") for side in of_model) for of_model in sides]
     return {
         "lots": len(lots),
         "units": units,
         "yield": [count / units if units else None for count in passed],
-        "fit_rms_ug": [_rms([side.fitted for side in own]) for own in sides],
-        "verification_rms_ug": [_rms([side.verified for side in own]) for own in sides],
-        "fresh_rms_ug": [_rms(own) for own in on_fresh],
-        "fresh_units": sum(len(one) for one in on_fresh[1]),
+        "fit_rms_ug": [_rms([side.fitted for side in of_model]) for of_model in sides],
+        "verification_rms_ug": [_rms([side.verified for side in of_model]) for of_model in sides],
+        "fresh_rms_ug": [_rms(sums) for sums in on_fresh],
+        "fresh_units": sum(len(sums) for sums in on_fresh[1]),
     }
 
 
@@ -162,8 +162,8 @@ def _verdict(
         return EQUAL, f"{sentence}: the scatter of {count} explains as much"
     hurt: list[str] = []
     for row in rows:
-        own = [lot for lot in lots if (lot.entry.station, lot.entry.device) == (row["station"], row["device"])]
-        ratios = _log_ratios(figure, own, fresh)
+        of_group = [lot for lot in lots if (lot.entry.station, lot.entry.device) == (row["station"], row["device"])]
+        ratios = _log_ratios(figure, of_group, fresh)
         grown = figure in _known(row) and _share(row[figure]) > FALLS and ratios.size >= FEWEST and ratios.mean() > 0.0
         if grown and _differs(ratios, LEVEL / len(rows)):
             hurt.append(f"{row['device']} on {row['station']}")
@@ -185,7 +185,7 @@ def _pairs(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) 
     """Errors of the units of each lot, under the old and the new model."""
     if figure == "fresh_rms_ug":
         return [(later.old, later.new) for lot in lots if (later := fresh.get(lot.entry.id))]
-    return [(old.verified, new.verified) for old, new in (one.sides for one in lots)]
+    return [(old.verified, new.verified) for old, new in (lot.sides for lot in lots)]
 
 
 def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> NDArray[np.float64]:
@@ -196,7 +196,7 @@ def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fre
             (before, _), (after, _) = old[unit], new[unit]
             if before > 0.0 and after > 0.0:
                 by_unit[unit].append(0.5 * float(np.log(after / before)))
-    return np.array([float(np.mean(own)) for own in by_unit.values()])
+    return np.array([float(np.mean(ratios)) for ratios in by_unit.values()])
 
 
 def _differs(ratios: NDArray[np.float64], level: float) -> bool:

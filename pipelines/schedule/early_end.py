@@ -58,7 +58,7 @@ class EarlyEnd(TypedDict):
 
 
 def early_end(run: Run) -> EarlyEnd | None:
-    """What ``[stop]`` of a run's recipe did; None without it."""
+    """The effect of ``[stop]`` on a run; None where the recipe has none."""
     about = run.about
     if not (about.get("recipe") or {}).get("stop") or "events" not in run.tables():
         return None
@@ -89,15 +89,15 @@ def early_end(run: Run) -> EarlyEnd | None:
 
 
 def _not_reached(run: Run, recipe: Recipe) -> Iterator[NotReached]:
-    """What ``[stop]`` asks for over the uncertainties of a run, of the noise alone where nothing is stated."""
+    """Quantities whose uncertainty (by noise alone where nothing is stated) exceeds what ``[stop]`` asks for."""
     if recipe.stop is None or not {"uncertainties", "coefficients"} <= set(run.tables()):
         return
     stated = run.table("uncertainties")
     if stated.empty:
-        own = run.table("coefficients")
-        scale = own[own["effect"] == "scale"].set_index(["unit", "axis"])["value"].abs()
-        per_g = scale.reindex(pd.MultiIndex.from_frame(own[["unit", "axis"]])).to_numpy()
-        stated = own.assign(quantity=own["effect"], u=MICRO * own["standard_error"] / per_g)
+        coefficients = run.table("coefficients")
+        scale = coefficients[coefficients["effect"] == "scale"].set_index(["unit", "axis"])["value"].abs()
+        per_g = scale.reindex(pd.MultiIndex.from_frame(coefficients[["unit", "axis"]])).to_numpy()
+        stated = coefficients.assign(quantity=coefficients["effect"], u=MICRO * coefficients["standard_error"] / per_g)
     factor = run.about["limits"]["coverage_factor"]
     for effect, asked in recipe.stop.asked.items():
         largest = factor / asked * stated[stated["quantity"] == effect].groupby("unit", observed=True)["u"].max()
@@ -114,7 +114,7 @@ def told_sentences(end: EarlyEnd) -> list[str]:
 def early_end_sentence(end: EarlyEnd, unit: str = "") -> str:
     """The early end in words, for summary, report and certificate; empty where the plan was measured as it stands.
 
-    unit : the one whose uncertainties are spoken of; all where empty
+    unit : whose uncertainties are worded; all units where empty
     """
     lengths = dwell_words(end)
     chosen = f"dwells of {lengths} s by the noise of the run" if len(set(end["dwell_s"])) > 1 else ""

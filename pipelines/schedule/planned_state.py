@@ -34,13 +34,13 @@ def planned_state(
     Quantities that the plan does not set (supply, vibration, what the station's reader records besides) wander a little, as they
     do on a station, so that effects of theirs are not refused.
 
-    station : the built-in simulated one where None
+    station : the built-in simulated station where None
     history : whether the temperatures between the dwells go along, as a station records them
     recorded : columns that are recorded besides; those of the station's reader where None
     """
     config = station or load_station()
-    whole = schedule(steps(recipe), config, recipe)
-    return state_of(whole, config, recipe, history=history, recorded=recorded)
+    activities = schedule(steps(recipe), config, recipe)
+    return state_of(activities, config, recipe, history=history, recorded=recorded)
 
 
 def state_of(
@@ -152,9 +152,9 @@ class Planned(NamedTuple):
 
 def planned_dwells(recipe: Recipe, station: StationConfig, activities: list[Activity] | None = None) -> Planned:
     """The dwells that a recipe plans on a station."""
-    whole = schedule(steps(recipe), station, recipe) if activities is None else activities
-    own = [one for one in whole if one.kind == "dwell"]
-    checks = [one for one in whole if one.kind == "verification"]
-    verification = state_of(whole, station, recipe, kinds=("verification",)) if checks else None
-    soak, target = (np.array([getattr(one.step, name) for one in own]) for name in ("soak", "temperature"))
-    return Planned(state_of(whole, station, recipe), verification, soak, target)
+    planned = schedule(steps(recipe), station, recipe) if activities is None else activities
+    dwells = [activity for activity in planned if activity.kind == "dwell"]
+    checks = [activity for activity in planned if activity.kind == "verification"]
+    verification = state_of(planned, station, recipe, kinds=("verification",)) if checks else None
+    soak, target = (np.array([getattr(activity.step, name) for activity in dwells]) for name in ("soak", "temperature"))
+    return Planned(state_of(planned, station, recipe), verification, soak, target)

@@ -41,7 +41,7 @@ class Step:
 
     @property
     def turns(self) -> tuple[Turn, ...]:
-        """What the table turns during the record."""
+        """The turns of the table during the record."""
         return self.order.turns if self.order is not None else ()
 
     def lasts(self, recipe: Recipe) -> float:
@@ -54,24 +54,24 @@ class Step:
 def steps(recipe: Recipe) -> list[Step]:
     """Every record of a recipe in order: of its procedures, or without a list of the multi-position test and the static record.
 
-    A procedure at the temperature of the one before shares its soak.
+    A procedure at the temperature of the procedure before shares its soak.
     """
     listed: list[tuple[str, Part | None]] = [(part.kind, part) for part in parts_of(recipe)]
     if not listed:
         listed = [("multi_position", None), *([("static_record", None)] if recipe.static_record_s > 0.0 else [])]
     records: list[Step] = []
     for number, (kind, part) in enumerate(listed):
-        own = PROCEDURES[kind].steps(part, recipe)
-        same = bool(records and own) and records[-1].temperature == own[0].temperature_C and own[0].settled
+        orders = PROCEDURES[kind].steps(part, recipe)
+        same = bool(records and orders) and records[-1].temperature == orders[0].temperature_C and orders[0].settled
         first = (records[-1].soak + (0 if same else 1)) if records else 0
-        for one in own:
+        for order in orders:
             step = Step(
                 record=len(records),
-                soak=first + one.soak - own[0].soak,
-                temperature=one.temperature_C,
+                soak=first + order.soak - orders[0].soak,
+                temperature=order.temperature_C,
                 procedure=number if recipe.procedures else None,
-                order=one if recipe.procedures else None,
-                **{name: getattr(one, name) for name in AS_STATED},
+                order=order if recipe.procedures else None,
+                **{name: getattr(order, name) for name in AS_STATED},
             )
             records.append(step)
     return records

@@ -28,7 +28,7 @@ class Minutes:
 
     @property
     def total(self) -> float:
-        """All of it."""
+        """The whole station time, min."""
         return self.moves + self.soaks + self.dwells + self.static_record + self.procedures
 
     def document(self) -> dict[str, float]:
@@ -41,7 +41,7 @@ class Minutes:
 
 @dataclass(frozen=True)
 class StationPose:
-    """Where a station stands: table in degrees, air and slowest device in °C, and the soak that it has reached."""
+    """The state of a station: table in degrees, air and slowest device in °C, and the soak that it has reached."""
 
     outer: float = 0.0
     inner: float = 0.0
@@ -52,7 +52,7 @@ class StationPose:
 
 @dataclass(frozen=True)
 class Activity:
-    """One thing that a station does for a step: from ``start`` s on for ``seconds``; air and device as it begins and ends."""
+    """An activity of a station for a step: from ``start`` s on for ``seconds``; air and device as it begins and ends."""
 
     kind: ActivityKind
     step: Step
@@ -85,7 +85,7 @@ def spent(stretches: Sequence[Activity]) -> Minutes:
 def schedule(
     steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: StationPose | None = None
 ) -> list[Activity]:
-    """What a station does for steps in order: soaks, moves with their settling, records; see :func:`minutes`."""
+    """The activities of a station for steps in order: soaks, moves with their settling, records; see :func:`minutes`."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
     now, clock = start or StationPose(air=room, device=room), 0.0
     activities: list[Activity] = []
@@ -162,7 +162,7 @@ def rule_of(station: StationConfig) -> timing.SoakRule:
 
 
 def drive_of(station: StationConfig) -> timing.Drive:
-    """How the table moves."""
+    """Speed, acceleration and settling of the table."""
     limits = station.limits
     return timing.Drive(limits.speed_deg_s, limits.acceleration_deg_s2, station.pace.in_position_s)
 
@@ -173,6 +173,6 @@ def lag_of(station: StationConfig) -> float:
 
 
 def _later(now: StationPose, target: float, seconds: float, station: StationConfig) -> StationPose:
-    """How the station stands some seconds later, while its air is at ``target`` °C or on the way there."""
+    """The state of the station some seconds later, while its air is at ``target`` °C or on the way there."""
     air, device = timing.followed(now.air, now.device, target, seconds, air_of(station))
     return replace(now, air=air, device=device)

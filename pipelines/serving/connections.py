@@ -1,7 +1,7 @@
 """The sockets of servers and their connections: at most so many, in all and of one address, and none that says nothing for long.
 
 They are counted where they are accepted, so that those within the handshake of TLS and WebSockets count too. An idle connection
-has no request in progress. Where there are too many, the oldest idle one is closed, so that idle ones shut nobody out; then the
+has no request in progress. Where there are too many, the oldest idle connection is closed, and none shuts others out; then the
 oldest long answer (a browser connects to a stream of events again by itself); a new connection is refused where there is neither.
 """
 
@@ -123,18 +123,18 @@ class Connections:
             return False
         self._forget_closed()
         recently = time.monotonic() - LOOK_S
-        waiting = any(one.shut_at > recently for one in self.open.values())
+        waiting = any(connection.shut_at > recently for connection in self.open.values())
         return waiting and len(self.open) >= self.limits.fitting * CROWD
 
     def admit(self, accepted: socket.socket, client: tuple[Any, ...]) -> bool:
         """Whether a connection is admitted; room is made by the end of an idle one."""
         self._forget_closed()
         address, port = str(client[0]), int(client[1])
-        there = [one for one in self.open.values() if not one.shut_at]
-        own = [one for one in there if one.address == address]
+        there = [connection for connection in self.open.values() if not connection.shut_at]
+        of_client = [connection for connection in there if connection.address == address]
         most = self.limits.of_one_address
-        if not ip_address(address.partition("%")[0]).is_loopback and len(own) >= most:
-            there, most = own, most - 1
+        if not ip_address(address.partition("%")[0]).is_loopback and len(of_client) >= most:
+            there, most = of_client, most - 1
         else:
             most = self.limits.fitting - 1
         if len(there) > most and not self._end_one(there):
@@ -152,11 +152,15 @@ class Connections:
         return None if client is None else self.open.get((client[0], client[1]))
 
     def _end_one(self, there: list[Connection]) -> bool:
-        """End the oldest idle connection, else the one with the oldest long answer; whether there was one."""
+        """End the oldest idle connection, else that with the oldest long answer; return whether any was ended."""
         long_before = time.monotonic() - self.limits.long_s
-        idle = [one for one in there if not one.requests and not one.unsent]
-        long = [one for one in there if (one.requests or one.unsent) and one.since < long_before]
-        chosen = min(idle or long, key=lambda one: one.since, default=None)
+        idle = [connection for connection in there if not connection.requests and not connection.unsent]
+        long = [
+            connection
+            for connection in there
+            if (connection.requests or connection.unsent) and connection.since < long_before
+        ]
+        chosen = min(idle or long, key=lambda connection: connection.since, default=None)
         if chosen is not None:
             chosen.close()
         return chosen is not None
@@ -164,14 +168,14 @@ class Connections:
     def _look(self) -> None:
         """End what has been idle for too long, again and again as long as there are connections."""
         self._forget_closed()
-        for one in self.open.values():
-            one.look(time.monotonic(), self.limits)
+        for connection in self.open.values():
+            connection.look(time.monotonic(), self.limits)
         self._looking = bool(self.open)
         if self._looking:
             asyncio.get_running_loop().call_later(min(LOOK_S, self.limits.idle_s / 2), self._look)
 
     def _forget_closed(self) -> None:
-        self.open = {key: one for key, one in self.open.items() if one.socket.fileno() >= 0}
+        self.open = {key: connection for key, connection in self.open.items() if connection.socket.fileno() >= 0}
 
 
 class TimedRequests:
@@ -240,26 +244,26 @@ class LimitedSocket(socket.socket):
 
 def bound_socket(host: str, port: int, command: str, limits: ConnectionLimits) -> LimitedSocket:
     """A socket of a port, not listening yet; a port that another program has, or an address of no interface, is refused."""
-    place = LimitedSocket(socket.AF_INET6 if ":" in host else socket.AF_INET)
-    place.connections = Connections(limits)
+    bound = LimitedSocket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    bound.connections = Connections(limits)
     try:
-        place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if ":" in host:
-            place.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
-        place.bind((host, port))
+            bound.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        bound.bind((host, port))
     except (OSError, UnicodeError) as problem:
-        place.close()
+        bound.close()
         number = getattr(problem, "errno", None)
         why = os.strerror(number) if number and number > 0 else str(problem)
         raise WrongUse(
             f"{command}: port {port} of {shown(host)} cannot be used ({why}), a free port of this machine is needed; end the "
             "program that has it, or give another with --port and --host (--port 0: a free one)"
         ) from None
-    return place
+    return bound
 
 
 def listening_socket(host: str, port: int, command: str, limits: ConnectionLimits | None = None) -> LimitedSocket:
     """A socket that listens: clients that come before the server is ready wait."""
-    place = bound_socket(host, port, command, limits or ConnectionLimits())
-    place.listen()
-    return place
+    bound = bound_socket(host, port, command, limits or ConnectionLimits())
+    bound.listen()
+    return bound

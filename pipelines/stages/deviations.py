@@ -45,7 +45,7 @@ class Statistic:
         integral if ``integral``
     parts : shortest record, in averaging times
     freedom : degrees of freedom of the variance at α, m and n; None: the statistic has no interval
-    bias : expectation of the variance over the one that it estimates, at α and m/n
+    bias : expectation of the variance over the Allan variance that it estimates, at α and m/n
     sees_ramp : whether a ramp of the output is part of the deviation
     """
 
@@ -165,7 +165,7 @@ def _largest(mixture: Array, tau: Array, statistic: Statistic) -> list[int | Non
         [3.0 * q**2 / tau**2, n**2 / tau, np.broadcast_to((FLICKER_FLOOR * b) ** 2, tau.shape), k**2 * tau / 3.0, ramp]
     )
     powers = [*POWER.values(), None]
-    return [powers[place] for place in np.argmax(shares, axis=0)]
+    return [powers[largest] for largest in np.argmax(shares, axis=0)]
 
 
 def _interval(statistic: Statistic, powers: list[int | None], m: Index, n: int) -> Array:

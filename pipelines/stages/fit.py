@@ -38,7 +38,7 @@ def fit(
     (method ``wander``); where there are too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: Birge
     ratio squared). The table ``wander`` says which; ``prior`` what the family of the devices adds. Tables without rows come back
     where no unit was accepted. Units that lack dwells which others have are fitted on theirs: with the noise of the units that
-    have the same ones, or, where the model has values that all units share, in one fit of the lot.
+    have the same dwells, or, where the model has values that all units share, in one fit of the lot.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None 
 
 
 def _lots(tables: LotTables, effects: Sequence[str]) -> list[LotArrays]:
-    """What is fitted together: units with the same dwells, or all where the model has values that they share."""
+    """The parts of a lot that are fitted together: units with the same dwells, or all where the model has shared values."""
     if len(tables.parts) == 1:
         return [tables.fitted_kinds]
     sensor, station = design.split(effects)
@@ -129,8 +129,8 @@ def _prior_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
         {
             "unit": picked(lot.units, u),
             "axis": picked(lot.letters, a),
-            "effect": picked([effect for own in names for effect, _ in own], a * len(names[0]) + c),
-            "name": picked([name for own in names for _, name in own], a * len(names[0]) + c),
+            "effect": picked([effect for terms in names for effect, _ in terms], a * len(names[0]) + c),
+            "name": picked([name for terms in names for _, name in terms], a * len(names[0]) + c),
             "mean": prior.mean[u, a, c],
             "standard_deviation": deviation[u, a, c],
             "share": fitted.of_prior.ravel(),
@@ -146,7 +146,7 @@ def _prior_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
 _PRIOR: dict[str, Any] = {
     "texts": "unit axis effect name",
     "numbers": "mean standard_deviation share widened p_value",
-    "whole": "units",
+    "integers": "units",
     "flags": "fits own",
 }
 
@@ -231,16 +231,16 @@ def _bias_of(lot: LotArrays, fitted: NoisyFit, scale: Array) -> dict[str, Array]
         return {name: np.full(scale.shape, np.nan) for name in COLUMNS}
     used = lot.of_kind("dwell")
     errors = np.sqrt(np.diagonal(fitted.fit.covariance, axis1=-2, axis2=-1))
-    own = np.mean(lot.standard_error[:, used] ** 2, axis=1)
+    counted = np.mean(lot.standard_error[:, used] ** 2, axis=1)
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0]
     carried = fitted.walk_shown or np.ptp(time[used]) >= LONG_S
     walk = fitted.walk if carried else np.zeros_like(fitted.walk)
-    excess = np.sqrt(np.maximum(fitted.white**2 - own, 0.0) + 0.5 * (fitted.walk**2 - walk**2))
-    record = np.stack([errors[:, axis, place] for axis, place in enumerate(places)], axis=1)
+    excess = np.sqrt(np.maximum(fitted.white**2 - counted, 0.0) + 0.5 * (fitted.walk**2 - walk**2))
+    record = np.stack([errors[:, axis, column] for axis, column in enumerate(places)], axis=1)
     record, flicker, walk, excess = (MICRO * part / scale for part in (record, fitted.flicker, walk, excess))
     noise = BiasNoise(
         error=record,
-        gain=np.stack([fitted.gain[:, axis, place] for axis, place in enumerate(places)], axis=1),
+        gain=np.stack([fitted.gain[:, axis, column] for axis, column in enumerate(places)], axis=1),
         flicker=flicker,
         carried=walk,
         excess=excess,
@@ -255,15 +255,15 @@ def _bias_of(lot: LotArrays, fitted: NoisyFit, scale: Array) -> dict[str, Array]
 def _nothing() -> dict[str, pd.DataFrame]:
     return {
         "coefficients": empty_table(texts="unit axis effect name unit_text", numbers="value standard_error"),
-        "covariance": empty_table(texts="unit axis", numbers="value", whole="row column"),
+        "covariance": empty_table(texts="unit axis", numbers="value", integers="row column"),
         "residuals": empty_table(
-            texts="unit axis pose", numbers="force_g residual_ug standard_error_ug expected_ug unit_C", whole="dwell"
+            texts="unit axis pose", numbers="force_g residual_ug standard_error_ug expected_ug unit_C", integers="dwell"
         ),
-        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
+        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", integers="dwell other"),
         "wander": empty_table(
             texts="unit axis method",
             numbers=" ".join(("white_ug flicker_ug walk_ug lack_of_fit", *COLUMNS)),
-            whole="dof",
+            integers="dof",
         ),
         "prior": empty_table(**_PRIOR),
     }

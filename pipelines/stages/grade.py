@@ -121,7 +121,7 @@ def grade(
             continue
         own_figures: list[Figure] = []
         if coefficients is not None:
-            own = UnitTables(
+            tables = UnitTables(
                 residuals.of(unit),
                 verification.of(unit),
                 verification_poses.of(unit),
@@ -131,7 +131,7 @@ def grade(
                 budget_of(unit),
                 evidence.full_scale.get(unit, float("nan")),
             )
-            own_figures += figures_of(own)
+            own_figures += figures_of(tables)
         own_figures += _of_procedures(evidence.procedure_figures, unit, limits)
         decisions = [
             decide(limits, f.name, f.of.value, f.of.uncertainty, f.of.law, f.of.median)
@@ -142,13 +142,13 @@ def grade(
             figure_rows += [
                 _figure_row(unit, figure, decisions, limits) for figure in own_figures if not figure.of.why_not
             ]
-            for one in own_figures:
-                squares.setdefault(one.name, []).append(one.of.shared**2)
+            for figure in own_figures:
+                squares.setdefault(figure.name, []).append(figure.of.shared**2)
         grade_rows.append(_decided(verdict, own_figures, decisions, limits, evidence.basis))
     grades = _table(grade_rows).assign(rule=rule, basis=evidence.basis)
     if not figures:
         return {"grades": grades}
-    shared = {name: float(np.sqrt(np.mean(own))) for name, own in squares.items()}
+    shared = {name: float(np.sqrt(np.mean(variances))) for name, variances in squares.items()}
     figure_table = _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS)
     return {
         "figures": figure_table,
@@ -158,7 +158,7 @@ def grade(
 
 
 def _budget(evidence: GradeEvidence) -> Callable[[str], Mapping[tuple[str, str], BudgetRow]]:
-    """What gives the quantities of the budget of a unit."""
+    """A function from a unit to the rows of its budget, by quantity and axis."""
     if evidence.budget is not None:
         return evidence.budget.of
     by_unit: dict[str, dict[tuple[str, str], BudgetRow]] = {}
@@ -197,11 +197,11 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
         # runs of earlier versions have none
         dof, removed = float(row.get("dof", np.nan)), float(row.get("removed", 0.0))
         error = float(row["uncertainty"]) if not why else 0.0
-        one = Figure(name, str(row["unit_text"]), Value(value, error, why, dof=dof, removed=removed))
+        figure = Figure(name, str(row["unit_text"]), Value(value, error, why, dof=dof, removed=removed))
         before = figures.get(name)
         least = name in limits.figures and limits.figures[name].min is not None
-        if before is None or _badness(one.of, guard, least=least) > _badness(before.of, guard, least=least):
-            figures[name] = one
+        if before is None or _badness(figure.of, guard, least=least) > _badness(before.of, guard, least=least):
+            figures[name] = figure
     return list(figures.values())
 
 
@@ -214,13 +214,13 @@ def _badness(figure: Value, guard: float, *, least: bool) -> float:
 
 
 def _coefficients(evidence: GradeEvidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:
-    """The coefficients of the lot and the place of each unit in them; None where no unit was calibrated."""
+    """The coefficients of the lot and the index of each unit in them; None where no unit was calibrated."""
     if evidence.coefficients.empty:
         return None, {}
     calibration = evidence.calibration or read_calibration(evidence.coefficients, evidence.covariance)
     units = len(calibration.units)
     stated = _stated(evidence.budget_covariance, units) if evidence.budget is None else evidence.budget.covariance
-    return LotCoefficients(calibration, zero_g, stated), {unit: place for place, unit in enumerate(calibration.units)}
+    return LotCoefficients(calibration, zero_g, stated), {unit: index for index, unit in enumerate(calibration.units)}
 
 
 def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
@@ -299,5 +299,5 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
 
 
 def has_least(limits: Limits) -> bool:
-    """Whether a limit is a least value: such figures stand in a column of their own, since ``limit`` is of a magnitude."""
+    """Whether a limit is a least value: such figures have a separate column, since ``limit`` is of a magnitude."""
     return any(figure.min is not None for figure in limits.figures.values())

@@ -40,7 +40,7 @@ def judge(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[
 
 
 def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> AdequacyDocument:
-    """What a diagnosis says of a model, without classes and proposals; where the data or an effect are not usable, the reason."""
+    """The verdict of a diagnosis on a model, without classes and proposals; the reason where data or an effect are not usable."""
     if dwells.empty:
         return _not_judged("every unit was refused, so that no dwell is left; see the reasons of each unit")
     from inertial.criticism.verdict import judged  # loads the search for effects: a run without dwells does not need it
@@ -74,7 +74,7 @@ def verdict_table(verdict: AdequacyDocument | None, effects: Sequence[str]) -> p
     """A verdict on a model as the table ``verdict``; without rows where there is none."""
     if verdict is None:
         return empty_table(
-            texts="model verdict reason faulty", numbers=" ".join(_FIGURES), whole="units", flags="named"
+            texts="model verdict reason faulty", numbers=" ".join(_FIGURES), integers="units", flags="named"
         )
     row = {
         "model": ",".join(effects),

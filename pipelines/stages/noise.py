@@ -98,26 +98,29 @@ def noise(record: StaticRecord | None) -> dict[str, pd.DataFrame]:
     channels, rate, size = record.channels, record.rate_hz, record.size
     curves, rows = list[pd.DataFrame](), list[tuple[object, ...]]()
     for group in alike(channels):
-        curve = overlapping(np.stack([one.record for one in group]), rate / size)
-        disturbed = [disturbances(one.record) for one in group]
+        curve = overlapping(np.stack([channel.record for channel in group]), rate / size)
+        disturbed = [disturbances(channel.record) for channel in group]
         terms = limits_where_unexplained(curve, without_disturbed(fit_terms(curve), disturbed))
-        terms = without_digits(terms, [one.digits for one in group], rate)
+        terms = without_digits(terms, [channel.digits for channel in group], rate)
         curves.append(_curve_rows(group, curve, terms))
         noted = [
-            replace(one, warmth="; ".join(filter(None, [*disturbance_texts(found, rate / size, "µg"), one.warmth])))
-            for one, found in zip(group, disturbed, strict=True)
+            replace(
+                channel, warmth="; ".join(filter(None, [*disturbance_texts(found, rate / size, "µg"), channel.warmth]))
+            )
+            for channel, found in zip(group, disturbed, strict=True)
         ]
-        rows += [row for place, one in enumerate(noted) for row in _term_rows(one, terms, place)]
-        for one in noted:
-            stability = bias_stability(one.record, rate / size)
+        rows += [row for index, channel in enumerate(noted) for row in _term_rows(channel, terms, index)]
+        for channel in noted:
+            stability = bias_stability(channel.record, rate / size)
             if stability is not None:
-                rows.append((one.unit, one.axis, TERM, *stability, True, "µg", one.warmth))
-    for one in channels:
-        if one.silent:
+                rows.append((channel.unit, channel.axis, TERM, *stability, True, "µg", channel.warmth))
+    for channel in channels:
+        if channel.silent:
             rows += [
-                (one.unit, one.axis, term, np.nan, 0.0, np.nan, False, text, one.silent) for term, text in UNITS.items()
+                (channel.unit, channel.axis, term, np.nan, 0.0, np.nan, False, text, channel.silent)
+                for term, text in UNITS.items()
             ]
-    order = {(one.unit, one.axis): place for place, one in enumerate(channels)}
+    order = {(channel.unit, channel.axis): index for index, channel in enumerate(channels)}
     rows.sort(key=lambda row: order[str(row[0]), str(row[1])])
     return {
         "allan": _sorted(pd.concat(curves, ignore_index=True), order) if curves else _nothing()["allan"],
@@ -211,18 +214,21 @@ def _why_silent(values: np.ndarray) -> str:
 def alike(channels: list[StaticChannel]) -> list[list[StaticChannel]]:
     """The usable channels, grouped by length of record."""
     lengths = dict.fromkeys(len(channel.record) for channel in channels if not channel.silent)
-    return [[one for one in channels if not one.silent and len(one.record) == length] for length in lengths]
+    return [
+        [channel for channel in channels if not channel.silent and len(channel.record) == length] for length in lengths
+    ]
 
 
 def _sorted(curves: pd.DataFrame, order: dict[tuple[str, str], int]) -> pd.DataFrame:
-    place = [order[key] for key in zip(curves["unit"], curves["axis"], strict=True)]
-    return curves.iloc[np.argsort(place, kind="stable")].reset_index(drop=True)
+    position = [order[key] for key in zip(curves["unit"], curves["axis"], strict=True)]
+    return curves.iloc[np.argsort(position, kind="stable")].reset_index(drop=True)
 
 
 def without_disturbed(terms: NoiseTerms, disturbed: Sequence[Sequence[Disturbance]]) -> NoiseTerms:
     """The terms of channels of which some hold what no noise explains: no mixture of terms describes these."""
     return replace(
-        terms, chi2=np.where([any(one.material for one in found) for found in disturbed], np.inf, terms.chi2)
+        terms,
+        chi2=np.where([any(disturbance.material for disturbance in found) for found in disturbed], np.inf, terms.chi2),
     )
 
 
@@ -258,7 +264,7 @@ def _curve_rows(channels: list[StaticChannel], curve: AllanCurve, terms: NoiseTe
     return pd.DataFrame(
         {
             "unit": np.array([channel.unit for channel in channels], dtype=object)[c],
-            "axis": np.array([one.axis for one in channels], dtype=object)[c],
+            "axis": np.array([channel.axis for channel in channels], dtype=object)[c],
             "tau_s": curve.tau[t],
             "deviation_ug": curve.deviation.ravel(),
             "low_ug": curve.low.ravel(),
@@ -269,18 +275,18 @@ def _curve_rows(channels: list[StaticChannel], curve: AllanCurve, terms: NoiseTe
     )
 
 
-def _term_rows(channel: StaticChannel, terms: NoiseTerms, place: int) -> list[tuple[object, ...]]:
+def _term_rows(channel: StaticChannel, terms: NoiseTerms, index: int) -> list[tuple[object, ...]]:
     rows = list[tuple[object, ...]]()
-    for symbol, term in terms.one(place).items():
+    for symbol, term in terms.one(index).items():
         value = np.nan if term.value is None else term.value
         note = "; ".join(filter(None, [channel.warmth, remark(channel.digits) if symbol in {"Q", "N"} else ""]))
         text = term.unit.format("µg")
         where = (channel.unit, channel.axis)
         rows.append((*where, symbol, value, term.low, term.high, term.identified, text, note))
         if symbol == "N":
-            ends = tuple(np.sqrt(2.0) * one for one in (value, term.low, term.high))
+            ends = tuple(np.sqrt(2.0) * end for end in (value, term.low, term.high))
             rows.append((*where, N_ONE_SIDED, *ends, term.identified, "µg/√Hz", note))
-    bound = float(terms.bias_instability_bound[place])
+    bound = float(terms.bias_instability_bound[index])
     return [*rows, (channel.unit, channel.axis, B_BOUND, np.nan, 0.0, bound, False, "µg", "")]
 
 

@@ -36,10 +36,10 @@ class NoisyFit:
     predicted : (units, 3, m, m), covariance of the residuals of the m dwells for verification
     flicker, walk, white : (units, 3), standard deviations; walk at the end of the record; walk_shown : whether the walk is
     distinguished from flicker
-    lack_of_fit : (units, 3), variance over that of the noise, one where it is no larger
+    lack_of_fit : (units, 3), variance of the residuals over that of the noise, 1 where it is no larger
     per_g : (units, 3), output per g
     gain : (units, 3, p, n), derivative of the coefficients by every output of the n fitted dwells; known : factor of their errors
-    prior : of the lot; of_prior : (units, 3, p), its share in the variance of every coefficient; None without one
+    prior : of the lot; of_prior : (units, 3, p), its share in the variance of every coefficient; None without a prior
     """
 
     method: Literal["wander", "birge"]
@@ -69,7 +69,7 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str], family: Family | N
     there = used if lot.missing is None else used & ~lot.missing
     error = np.where(there[..., None], lot.standard_error, np.inf)
     if lot.missing is not None:
-        # what has no weight may be any number, but one that is near costs no digits
+        # what has no weight may be any number, but a near number costs no digits
         _refuse_short(lot, effects, there)
         near = fit_lot(effects, lot.state, lot.output, error)
         lot = replace(lot, output=np.where(lot.missing[..., None], lot.output - near.residuals, lot.output))
@@ -132,9 +132,9 @@ class _Belief:
 
 def _felt(lot: LotArrays, used: Flags) -> Array:
     """Force along the sensors' own axes at every dwell, (units, n, 3), g; misalignment from the dwells of the fit alone."""
-    force, own = lot.state.force, lot.state.force[:, used]
+    force, fitted = lot.state.force, lot.state.force[:, used]
     theta = None if lot.state.theta is None else np.broadcast_to(lot.state.theta, lot.output.shape[:2])[:, used]
-    turn = pseudo_inverses(own) @ felt_force(own, lot.output[:, used], theta, lot.state.axes)
+    turn = pseudo_inverses(fitted) @ felt_force(fitted, lot.output[:, used], theta, lot.state.axes)
     return force @ turn
 
 
@@ -174,13 +174,13 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: Flags, believed: _Belief | No
         covariance, of_prior = both.covariance, both.share
     unseen = columns[..., ~used, :]
     model = np.einsum("...np,...pq,...mq->...nm", unseen, covariance, unseen)
-    own = np.swapaxes(noise[:, ~used] ** 2, -1, -2)
+    variance = np.swapaxes(noise[:, ~used] ** 2, -1, -2)
     return NoisyFit(
         method="birge",
         fit=replace(plain, covariance=covariance),
         noise=noise,
         expected=noise,
-        predicted=model + own[..., None] * np.eye(own.shape[-1]),
+        predicted=model + variance[..., None] * np.eye(variance.shape[-1]),
         white=np.sqrt(np.mean(noise**2, axis=1)),
         flicker=np.zeros_like(stretch),
         walk=np.zeros_like(stretch),
@@ -199,7 +199,7 @@ def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
     Raises
     ------
     DataRejected
-        The model has no scale, and the output is in a unit of its own: its size in g is unknown.
+        The model has no scale, and the output is in a unit that is not g: its size in g is unknown.
     """
     scale = np.abs(lot_fit.scale())
     if "scale" in lot_fit.effects:
@@ -216,7 +216,7 @@ def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
 
 
 def profiled(lot: LotArrays, effects: Sequence[str], used: Flags) -> dict[str, dict[str, Any]]:
-    """Values of nonlinear parameters and constants by effect id, one or one per axis; none for a linear model.
+    """Values of nonlinear parameters and constants by effect id, one value or one per axis; empty for a linear model.
 
     Parameters
     ----------

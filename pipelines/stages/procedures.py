@@ -42,12 +42,14 @@ def procedures(
         procedure = PROCEDURES[part.kind]
         if not isinstance(procedure, Evaluated):
             continue  # its records are those of the stages reduce, fit, verify and noise
-        own = [(record, step) for record, (of, step) in enumerate(steps) if of == number and step.kind == "procedure"]
-        if not own:
+        numbered = [
+            (record, step) for record, (of, step) in enumerate(steps) if of == number and step.kind == "procedure"
+        ]
+        if not numbered:
             continue
         records = (
             procedure_record(record, step, samples({record}), _answered(readings, record, accepted), recipe.sensor_axes)
-            for record, step in own
+            for record, step in numbered
         )
         results.append((number, part.kind, *_analysed(procedure, part, records, device, accepted)))
     return procedure_tables(results)
@@ -68,23 +70,23 @@ def _analysed(
         why = "its records give no value"
     except InertialError as problem:
         table, outcome, why = point_table([]), Outcome({}), str(problem)
-    whole: dict[str, list[FigureValue]] = {}
+    completed: dict[str, list[FigureValue]] = {}
     for unit in units:
         values = list(outcome.figures.get(unit, []))
         there = {value.figure for value in values}
         missing = [spec for spec in procedure.figures if spec.name not in there]
-        whole[unit] = values + [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
-    return table, replace(outcome, figures=whole)
+        completed[unit] = values + [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
+    return table, replace(outcome, figures=completed)
 
 
 def _answered(readings: pd.DataFrame, record: int, accepted: list[str]) -> pd.DataFrame:
     """Readings of a record of the accepted units that answered."""
-    own = readings[(readings["record"] == record) & (readings["status"] == "ok")]
-    return own[own["unit"].isin(accepted)]
+    answered = readings[(readings["record"] == record) & (readings["status"] == "ok")]
+    return answered[answered["unit"].isin(accepted)]
 
 
 def _device(readings: pd.DataFrame, coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Device:
-    """The units with the scale of their calibration, where the recipe has one."""
+    """The units with the scale of their calibration, where the recipe calibrates them."""
     device = nominal_device(readings)
     if coefficients.empty:
         return device
@@ -109,4 +111,4 @@ def identified_noise(terms: pd.DataFrame | None) -> dict[tuple[str, str], Identi
     for row in terms[terms["term"].isin(["B", "K"])].to_dict("records"):
         ends = float(row["value"]), float(row["low"]), float(row["high"])
         of.setdefault((str(row["unit"]), str(row["axis"])), {})[str(row["term"])] = ends
-    return {key: IdentifiedNoise(one["B"], one["K"]) for key, one in of.items()}
+    return {key: IdentifiedNoise(terms["B"], terms["K"]) for key, terms in of.items()}

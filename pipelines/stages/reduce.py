@@ -58,8 +58,8 @@ def reduce(
     static = readings[readings["unit"].isin(accepted) & ~readings["kind"].isin([STATIC, PROCEDURE])]
     # a covariate with a missing reading cannot be used by a model; it stays in the readings
     recorded = [column for column in covariates(readings) if static[column].notna().all()]
-    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *recorded]
-    columns = static[[*kept, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
+    names = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *recorded]
+    columns = static[[*names, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
     dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")
     angles = (np.radians(dwells[name].to_numpy()) for name in ("outer_deg", "inner_deg"))
     force = local_gravity_m_s2 / STANDARD_GRAVITY_M_S2 * force_from_angles(*angles)

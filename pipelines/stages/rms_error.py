@@ -54,7 +54,7 @@ def rms_uncertainty(error: Array, covariance: Array) -> Array:
     m = error.shape[-1]
     moved = np.einsum("...jk,...k->...j", covariance, error)
     squared = covariance @ covariance
-    traces = [np.einsum("...jj->...", one) for one in (covariance, squared)]
+    traces = [np.einsum("...jj->...", matrix) for matrix in (covariance, squared)]
     traces.append(np.einsum("...jk,...kj->...", squared, covariance))
     square = np.sum(error**2, axis=-1)
     share = np.maximum(1.0 - (traces[0] + np.sqrt(2.0 * traces[1])) / np.maximum(square, _TINY), 0.0)
@@ -65,7 +65,7 @@ def rms_uncertainty(error: Array, covariance: Array) -> Array:
 
 
 def _spread_of_root(second: Array, third: Array) -> Array:
-    """Standard deviation of the root of a positive sum of squares of mean one with these second and third cumulants.
+    """Standard deviation of the root of a positive sum of squares of mean 1 with these second and third cumulants.
 
     Of χ²/ν it is 0.603 for one degree of freedom, and 1/√(2ν) for many. χ² is the cube of a normal value (Wilson and Hilferty,
     Proc. Nat. Acad. Sci. 17 (1931) 684).

@@ -32,7 +32,7 @@ UNIT = "µg/√Hz"
 
 @dataclass
 class _Soak:
-    """What the dwells of one soak have shown of one unit: sums over the records of equal length.
+    """Sums over the records of equal length of one unit in one soak.
 
     total : (axes, t), of Allan variances, output unit squared · step : (axes,), finest step between digits, 0 for fine ones
     """
@@ -63,7 +63,7 @@ def soak_noise(
         return _nothing()
     calibration = read_calibration(coefficients, covariance)
     soaks = _soaks(samples, readings, calibration)
-    rows = [row for (unit, soak), one in sorted(soaks.items()) for row in _soak_rows(unit, soak, one, calibration)]
+    rows = [row for (unit, soak), sums in sorted(soaks.items()) for row in _soak_rows(unit, soak, sums, calibration)]
     table = pd.DataFrame(rows)
     if not rows or np.ptp(table["temperature_C"].to_numpy(dtype=float)) < APART_K:
         return _nothing()
@@ -71,7 +71,7 @@ def soak_noise(
     p = _difference(table)
     table[["curve", "curve_u"]] = np.nan
     axes = table.groupby(["unit", "axis"], sort=False)
-    changes = [_change(table, own, p, axes.ngroups) for _, own in axes]
+    changes = [_change(table, rows, p, axes.ngroups) for _, rows in axes]
     known = [change for change in changes if change is not None]
     return {"soak_noise": table, "noise_temperature": pd.DataFrame(known)} if known else _nothing()
 
@@ -80,15 +80,15 @@ def _soaks(
     samples: Iterable[pd.DataFrame], readings: pd.DataFrame, calibration: Calibration
 ) -> dict[tuple[str, int], _Soak]:
     """The sums of every unit and soak; a soak whose temperature moved is left out, and records of another length."""
-    kept = readings[~readings["kind"].isin([STATIC, PROCEDURE]) & (readings["status"] == "ok")]
-    found = {(int(r["record"]), str(r["unit"])): r for r in rows_of(kept)}
-    lengths = kept["n"].mode()
+    static = readings[~readings["kind"].isin([STATIC, PROCEDURE]) & (readings["status"] == "ok")]
+    found = {(int(r["record"]), str(r["unit"])): r for r in rows_of(static)}
+    lengths = static["n"].mode()
     soaks: dict[tuple[str, int], _Soak] = {}
     for record, tables in by_record(samples):
-        for unit, own in pd.concat(tables).groupby("unit", sort=False):
+        for unit, rows in pd.concat(tables).groupby("unit", sort=False):
             reading = found.get((record, str(unit)))
-            output = own[list(calibration.letters)].to_numpy(dtype=float).T
-            n, finite = len(own), bool(np.isfinite(output).all())
+            output = rows[list(calibration.letters)].to_numpy(dtype=float).T
+            n, finite = len(rows), bool(np.isfinite(output).all())
             if reading is None or n != lengths.iloc[0] or n < FEWEST or not finite:
                 continue
             m, variance = variances(output, float(reading["rate_hz"]))
@@ -100,7 +100,7 @@ def _soaks(
             soak.step = np.fmin(soak.step, [_step(axis) for axis in output])
             soak.records += 1
             soak.temperatures.append(float(reading["unit_C"]))
-    return {key: one for key, one in soaks.items() if np.ptp(one.temperatures) <= APART_K}
+    return {key: soak for key, soak in soaks.items() if np.ptp(soak.temperatures) <= APART_K}
 
 
 def _step(values: Array) -> float:
@@ -108,36 +108,36 @@ def _step(values: Array) -> float:
     return step_of(different) if different.size <= COUNTED else 0.0
 
 
-def _soak_rows(unit: str, soak: int, one: _Soak, calibration: Calibration) -> list[dict[str, Any]]:
+def _soak_rows(unit: str, soak: int, sums: _Soak, calibration: Calibration) -> list[dict[str, Any]]:
     if unit not in calibration.units:
         return []
     scale = np.abs(calibration.scale[calibration.units.index(unit)]) / MICRO
-    mean = one.total / one.records / scale[:, None] ** 2
+    mean = sums.total / sums.records / scale[:, None] ** 2
     alive = np.flatnonzero((mean > 0.0).all(axis=1))
     if not alive.size:
         return []
-    curve = curve_of(mean[alive], one.m, one.n, one.rate_hz, one.records)
+    curve = curve_of(mean[alive], sums.m, sums.n, sums.rate_hz, sums.records)
     # the Allan variance of neighbours is the variance of a sample by their differences
-    digits = [Coarse(float(one.step[a] / scale[a]), float(mean[a, 0]), np.inf) for a in alive.tolist()]
-    terms = without_digits(limits_where_unexplained(curve, fit_terms(curve, only="N")), digits, one.rate_hz)
+    digits = [Coarse(float(sums.step[a] / scale[a]), float(mean[a, 0]), np.inf) for a in alive.tolist()]
+    terms = without_digits(limits_where_unexplained(curve, fit_terms(curve, only="N")), digits, sums.rate_hz)
     return [
         {
             "unit": unit,
             "axis": calibration.letters[axis],
             "soak": soak,
-            "temperature_C": float(np.mean(one.temperatures)),
-            "dwells": one.records,
-            **_white(terms, place),
+            "temperature_C": float(np.mean(sums.temperatures)),
+            "dwells": sums.records,
+            **_white(terms, row),
             "unit_text": UNIT,
-            "note": remark(digits[place]),
+            "note": remark(digits[row]),
         }
-        for place, axis in enumerate(alive.tolist())
+        for row, axis in enumerate(alive.tolist())
     ]
 
 
-def _white(terms: NoiseTerms, place: int) -> dict[str, Any]:
+def _white(terms: NoiseTerms, channel: int) -> dict[str, Any]:
     n = terms.symbols.index("N")
-    value, low, high = (float(part[place, n]) for part in (terms.value, terms.low, terms.high))
+    value, low, high = (float(part[channel, n]) for part in (terms.value, terms.low, terms.high))
     return {"value": value, "low": low, "high": high, "identified": bool(np.isfinite(value))}
 
 
@@ -149,22 +149,22 @@ def _difference(table: pd.DataFrame) -> float:
     return difference_p(2.0 * np.log(sizes.to_numpy(dtype=float)))
 
 
-def _change(table: pd.DataFrame, own: pd.DataFrame, p: float, axes: int) -> dict[str, Any] | None:
+def _change(table: pd.DataFrame, rows: pd.DataFrame, p: float, axes: int) -> dict[str, Any] | None:
     """The change of one axis over temperature; its curve is written into the rows of the table."""
-    known = own[own["identified"]]
+    known = rows[rows["identified"]]
     temperature, value = (known[name].to_numpy(dtype=float) for name in ("temperature_C", "value"))
     u = (known["high"] - known["low"]).to_numpy(dtype=float) / (2.0 * NORMAL_95)
     curve = density_curve(temperature, value, u) if len(known) > 1 else None
     if curve is None:
         return None
-    table.loc[own.index, "curve"], table.loc[own.index, "curve_u"] = curve.at(
-        own["temperature_C"].to_numpy(dtype=float)
+    table.loc[rows.index, "curve"], table.loc[rows.index, "curve_u"] = curve.at(
+        rows["temperature_C"].to_numpy(dtype=float)
     )
     cold, hot = float(temperature.min()), float(temperature.max())
     ratio, u_ratio = curve.ratio(cold, hot)
     u_p = NORMAL_95 * u_ratio
     return {
-        **{name: own[name].iloc[0] for name in ("unit", "axis")},
+        **{name: rows[name].iloc[0] for name in ("unit", "axis")},
         "cold_C": cold,
         "hot_C": hot,
         "ratio": ratio,
@@ -176,7 +176,7 @@ def _change(table: pd.DataFrame, own: pd.DataFrame, p: float, axes: int) -> dict
 
 
 def verdict(ratio: float, half: float, p: float, axes: int) -> str:
-    """What noise of an axis does over temperature.
+    """Verdict on the white noise of an axis over temperature: it grows, falls, differs, is steady, or cannot be told.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def _nothing() -> dict[str, pd.DataFrame]:
         "soak_noise": empty_table(
             texts="unit axis unit_text note",
             numbers="temperature_C value low high curve curve_u",
-            whole="soak dwells",
+            integers="soak dwells",
             flags="identified",
         ),
         "noise_temperature": empty_table(texts="unit axis verdict", numbers="cold_C hot_C ratio low high p_value"),

@@ -81,9 +81,9 @@ class StaticSeries:
         for unit, rows in samples.groupby("unit", sort=False).indices.items():
             if unit in self._rest:
                 joined = np.concatenate((self._rest[str(unit)], output[rows]))
-                whole = len(joined) // self.size * self.size
-                self._means[str(unit)].append(joined[:whole].reshape(-1, self.size, len(self._letters)).mean(axis=1))
-                self._rest[str(unit)] = joined[whole:]
+                end = len(joined) // self.size * self.size
+                self._means[str(unit)].append(joined[:end].reshape(-1, self.size, len(self._letters)).mean(axis=1))
+                self._rest[str(unit)] = joined[end:]
                 for axis, digits in enumerate(self.digits[str(unit)]):
                     digits.add(output[rows, axis])
 
@@ -120,11 +120,11 @@ def warmed(
     reading : row of the static record: angles of the table
     """
     still = np.zeros((time.size, len(calibration.axes)))
-    own = None if history is None or not time.size else _smoothed(history, unit, float(time[0]), float(time[-1]))
+    smoothed = None if history is None or not time.size else _smoothed(history, unit, float(time[0]), float(time[-1]))
     effects = [e for e in design.split(calibration.effects)[0] if "temperature" in e.id]
-    if own is None:
+    if smoothed is None:
         return Warmed(still, float("nan"), bool(effects))
-    when, temperature = own
+    when, temperature = smoothed
     span = float(np.ptp(temperature))
     if not effects:
         return Warmed(still, span, known=False)
@@ -132,11 +132,11 @@ def warmed(
     force = np.broadcast_to(force_from_angles(outer, inner), (when.size, 3))
     if not np.all(np.isfinite(force)):
         return Warmed(still, span, known=False)
-    place = calibration.units.index(unit)
-    felt = force_along_axes(calibration.response[place], force)
+    index = calibration.units.index(unit)
+    felt = force_along_axes(calibration.response[index], force)
     state = State(force=force, time=when, temperature=temperature, felt=felt, axes=calibration.axes)
     columns = design.local_columns(effects, state, {})
-    coefficients = np.concatenate([calibration.value(e.id)[place] for e in effects], axis=-1)
+    coefficients = np.concatenate([calibration.value(e.id)[index] for e in effects], axis=-1)
     change = np.einsum("anp,ap->na", columns, coefficients)
     along = np.stack([np.interp(time, when, part) for part in change.T], axis=1)
     return Warmed(along - along.mean(axis=0), span, known=True)
@@ -220,17 +220,17 @@ def without_digits(terms: NoiseTerms, digits: Sequence[Coarse], rate_hz: float) 
     """
     n = terms.symbols.index("N")
     value, low, high = (part.copy() for part in (terms.value, terms.low, terms.high))
-    for c, one in enumerate(digits):
-        if not one.matters:
+    for c, digit in enumerate(digits):
+        if not digit.matters:
             continue
-        if one.correctable:
-            rounding, left = one.step**2 / 12.0, float(ripple(np.asarray(one.spread), np.asarray(one.step)))
+        if digit.correctable:
+            rounding, left = digit.step**2 / 12.0, float(ripple(np.asarray(digit.spread), np.asarray(digit.step)))
             value[c, n] = _less(value[c, n], rounding, rate_hz)
             low[c, n] = _less(low[c, n], rounding + left, rate_hz)
             high[c, n] = _less(high[c, n], rounding - left, rate_hz)
         else:
             value[c, n], low[c, n] = np.nan, 0.0
-            high[c, n] = max(high[c, n], one.most / np.sqrt(rate_hz))
+            high[c, n] = max(high[c, n], digit.most / np.sqrt(rate_hz))
     return replace(terms, value=value, low=low, high=high)
 
 

@@ -71,9 +71,9 @@ def _verdicts(faults: list[DataFault], units: Sequence[Unit]) -> pd.DataFrame:
         for fault in faults:
             if fault.unit == unit.serial:
                 reasons.setdefault(fault.fault, []).append(fault.reason)
-        others = [len(set(own)) - 1 for own in reasons.values()]
+        others = [len(set(texts)) - 1 for texts in reasons.values()]
         more = [f" (and {count} more of this kind)" if count else "" for count in others]
-        shown = [own[0] + text for own, text in zip(reasons.values(), more, strict=True)]
+        shown = [texts[0] + text for texts, text in zip(reasons.values(), more, strict=True)]
         rows.append(
             {
                 "unit": unit.serial,
@@ -117,29 +117,29 @@ def _sample_faults(answered: pd.DataFrame, summaries: pd.DataFrame) -> list[Data
     faults: list[DataFault] = []
     for record in summaries["record"].unique():
         for row in answered[answered["record"] == record].to_dict("records"):
-            own = known.get((record, row["unit"]))
-            fault = _fault_of(own, str(row["out_unit"]), int(row["n"]), float(row["full_scale"]))
+            summary = known.get((record, row["unit"]))
+            fault = _fault_of(summary, str(row["out_unit"]), int(row["n"]), float(row["full_scale"]))
             if fault:
-                place = f"in record {row['record']} (pose {row['pose']})"
-                faults.append(DataFault(str(row["unit"]), fault[0], f"{fault[1]} {place}; {fault[2]}"))
+                where = f"in record {row['record']} (pose {row['pose']})"
+                faults.append(DataFault(str(row["unit"]), fault[0], f"{fault[1]} {where}; {fault[2]}"))
     return faults
 
 
-def _fault_of(own: Mapping[Any, Any] | None, unit: str, n: int, full: float) -> tuple[str, str, str] | None:
+def _fault_of(summary: Mapping[Any, Any] | None, unit: str, n: int, full: float) -> tuple[str, str, str] | None:
     """Fault, finding and remedy of one unit's samples in one record; None if there is none."""
-    there = 0 if own is None else own["n"]
-    if own is None or there < SAMPLES_KEPT * n or there == 0:
+    there = 0 if summary is None else summary["n"]
+    if summary is None or there < SAMPLES_KEPT * n or there == 0:
         return "dropped_samples", f"{there} samples of {n}", "measure again"
-    if own["wild_count"]:
-        where = f"on {AXES[own['wild_axis']]} in row {own['wild_row']} ({own['wild_count']} such values)"
-        return "not_finite", f"{own['wild_value']} {where}", "measure again"
-    still = [k for k in range(len(AXES)) if LOWS[k] in own and own[LOWS[k]] == own[HIGHS[k]]]
+    if summary["wild_count"]:
+        where = f"on {AXES[summary['wild_axis']]} in row {summary['wild_row']} ({summary['wild_count']} such values)"
+        return "not_finite", f"{summary['wild_value']} {where}", "measure again"
+    still = [k for k in range(len(AXES)) if LOWS[k] in summary and summary[LOWS[k]] == summary[HIGHS[k]]]
     if there >= FEWEST_TO_JUDGE and still:
-        finding = f"constant output {own[LOWS[still[0]]]:g} {unit} on {AXES[still[0]]}"
+        finding = f"constant output {summary[LOWS[still[0]]]:g} {unit} on {AXES[still[0]]}"
         return "stuck_output", finding, "check wiring and power of the slot"
-    if own["clipped"]:
-        where = f"({full:g} {unit} from zero) on {AXES[own['clipped_axis']]}"
-        return "clipped", f"{own['clipped']} samples at full scale {where}", "choose a wider range"
+    if summary["clipped"]:
+        where = f"({full:g} {unit} from zero) on {AXES[summary['clipped_axis']]}"
+        return "clipped", f"{summary['clipped']} samples at full scale {where}", "choose a wider range"
     return None
 
 
@@ -158,10 +158,10 @@ def _stale_temperatures(readings: pd.DataFrame) -> list[DataFault]:
         DataFault(
             str(unit),
             "stale_temperature",
-            f"the unit's temperature moved {own:.2f} K while the chamber moved {chamber:.1f} K, at least "
+            f"the unit's temperature moved {device:.2f} K while the chamber moved {chamber:.1f} K, at least "
             f"{FOLLOWED_SHARE * chamber:.1f} K is needed; check the temperature sensor",
         )
-        for unit, chamber, own in zip(stale.index, stale["chamber_C"], stale["unit_C"], strict=True)
+        for unit, chamber, device in zip(stale.index, stale["chamber_C"], stale["unit_C"], strict=True)
     ]
 
 
@@ -221,14 +221,14 @@ def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:
 
 
 def _of_soak(means: pd.DataFrame, static: pd.DataFrame) -> float:
-    kept = [
+    outputs = [
         rows.set_index("record")[list(AXES)].reindex(static.index).to_numpy(dtype=float)
         for _, rows in means.groupby("unit")
     ]
-    whole = [table for table in kept if np.all(np.isfinite(table))]
-    if not whole:
+    complete = [table for table in outputs if np.all(np.isfinite(table))]
+    if not complete:
         return 0.0
-    return pointing_error(_force(static[["outer_deg", "inner_deg"]].to_numpy(dtype=float)), np.stack(whole, axis=1))
+    return pointing_error(_force(static[["outer_deg", "inner_deg"]].to_numpy(dtype=float)), np.stack(complete, axis=1))
 
 
 SAME_K = 1e-9  # means of equal readings differ by rounding
@@ -268,12 +268,12 @@ def _by_chance(changed: Flags, counted: Flags, column: int, still: int) -> float
     changed, counted : (steps, units); a step within one soak is counted
     """
     steps = len(changed)
-    own = counted[: steps - still, column]
+    compared = counted[: steps - still, column]
     others = np.delete(counted[steps - still :], column, axis=1)
     rates = [
         float(np.sum(moved & there)) / (float(np.sum(there)) + 1.0)
         for moved, there in (
-            (changed[: steps - still, column], own),
+            (changed[: steps - still, column], compared),
             (np.delete(changed[steps - still :], column, axis=1), others),
         )
         if there.any()

@@ -54,8 +54,8 @@ def verify_tables(
     if len(tables.parts) > 1 and isinstance(predictions, pd.DataFrame):
         made: list[dict[str, pd.DataFrame]] = []
         for part in tables.parts:
-            own = [own_rows(one, part.dwells) for one in (coefficients, covariance, predictions)]
-            made.append(verify_tables(part, own[0], own[1], own[2]))
+            tables_of_part = [own_rows(table, part.dwells) for table in (coefficients, covariance, predictions)]
+            made.append(verify_tables(part, tables_of_part[0], tables_of_part[1], tables_of_part[2]))
         return joined_parts(made)
     lot, calibration = tables.all_kinds, calibration or read_calibration(coefficients, covariance)
     model, unseen = calibration.effects, lot.of_kind("verification")
@@ -120,15 +120,15 @@ def _expected(predictions: pd.DataFrame, units: tuple[str, ...]) -> Array:
 def _pose_rows(lot: LotArrays, unseen: Flags, error: Array, expected: Array) -> pd.DataFrame:
     poses = np.asarray(lot.poses, dtype=object)[unseen]
     names = list(dict.fromkeys(poses.tolist()))
-    own = [np.flatnonzero(poses == pose) for pose in names]
+    dwells = [np.flatnonzero(poses == pose) for pose in names]
     return pd.DataFrame(
         {
             "unit": list(lot.units) * len(names),
             "pose": [pose for pose in names for _ in lot.units],
-            "dwells": np.repeat([places.size for places in own], len(lot.units)),
-            "error_ug": np.concatenate([error[:, places].mean(axis=1) for places in own]),
+            "dwells": np.repeat([places.size for places in dwells], len(lot.units)),
+            "error_ug": np.concatenate([error[:, places].mean(axis=1) for places in dwells]),
             # standard deviation of the mean over the dwells of a pose
-            "uncertainty_ug": np.concatenate([np.sqrt(expected[:, k][:, :, k].mean(axis=(1, 2))) for k in own]),
+            "uncertainty_ug": np.concatenate([np.sqrt(expected[:, k][:, :, k].mean(axis=(1, 2))) for k in dwells]),
         }
     )
 
@@ -153,6 +153,6 @@ def nothing_verified() -> dict[str, pd.DataFrame]:
     numbers = "norm_g error_ug uncertainty_ug reading_ug error_x_ug error_y_ug error_z_ug unit_C"
     numbers += "".join(f" {name.format(letter)}" for name in OF_UNITS for letter in AXES)
     return {
-        "verification": empty_table(texts="unit pose", whole="dwell", numbers=numbers),
-        "verification_poses": empty_table(texts="unit pose", whole="dwells", numbers="error_ug uncertainty_ug"),
+        "verification": empty_table(texts="unit pose", integers="dwell", numbers=numbers),
+        "verification_poses": empty_table(texts="unit pose", integers="dwells", numbers="error_ug uncertainty_ug"),
     }

@@ -71,8 +71,8 @@ class Calibration:
 
     def _of(self, effect: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The columns of one effect, of values (units, 3, p)."""
-        own = [[column for column, (name, _) in enumerate(names) if name == effect] for names in self.names]
-        return np.stack([values[:, axis, columns] for axis, columns in enumerate(own)], axis=1)
+        by_axis = [[column for column, (name, _) in enumerate(names) if name == effect] for names in self.names]
+        return np.stack([values[:, axis, columns] for axis, columns in enumerate(by_axis)], axis=1)
 
 
 def column_names(
@@ -87,7 +87,7 @@ def column_names(
 
 @lru_cache(maxsize=64)
 def _all_names(sensor: tuple[SensorEffect, ...], axes: tuple[int, ...]) -> tuple[tuple[tuple[str, str], ...], ...]:
-    """Per axis, all columns that effects may have; the model of many lots is the same."""
+    """Per axis, all columns that effects may have; cached, since many lots share a model."""
     return tuple(design.local_names(sensor, axis) for axis in axes)
 
 
@@ -102,9 +102,9 @@ def coefficient_rows(
     errors = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     common = _common_rows(fit, nonlinear_error)
     texts = {effect.id: unit_texts(effect, out_unit) for effect in design.split(fit.effects)[0]}
-    own = [(AXES[k], *row) for k, names in zip(fit.axes, fit.names, strict=True) for row in _with_units(names, texts)]
+    local = [(AXES[k], *row) for k, names in zip(fit.axes, fit.names, strict=True) for row in _with_units(names, texts)]
     axis, effect, name, text = zip(
-        *own, *((row.axis, row.effect, row.name, row.unit_text) for row in common), strict=True
+        *local, *((row.axis, row.effect, row.name, row.unit_text) for row in common), strict=True
     )
     u, k = (index.ravel() for index in np.indices((len(units), len(axis))))
     return pd.DataFrame(
@@ -134,18 +134,18 @@ class _Row(NamedTuple):
 def _with_units(names: Sequence[tuple[str, str]], texts: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str, str]]:
     """Effect, name and unit of every column of an axis."""
     for effect, columns in groupby(names, key=lambda pair: pair[0]):
-        own = [name for _, name in columns]
-        yield from ((effect, name, text) for name, text in zip(own, texts[effect][: len(own)], strict=True))
+        of_effect = [name for _, name in columns]
+        yield from ((effect, name, text) for name, text in zip(of_effect, texts[effect][: len(of_effect)], strict=True))
 
 
-def _beside(own: NDArray[np.float64], common: Sequence[float]) -> NDArray[np.float64]:
+def _beside(local: NDArray[np.float64], common: Sequence[float]) -> NDArray[np.float64]:
     """Values of every unit, (units, 3, p), followed by the shared values, in one row."""
-    flat = own.reshape(len(own), -1)
-    return np.concatenate([flat, np.broadcast_to(np.array(common), (len(own), len(common)))], axis=1).ravel()
+    flat = local.reshape(len(local), -1)
+    return np.concatenate([flat, np.broadcast_to(np.array(common), (len(local), len(common)))], axis=1).ravel()
 
 
 def _common_rows(fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]) -> list[_Row]:
-    """Parameters of the station, nonlinear parameters and constants: one for all axes, or one for each axis."""
+    """Parameters of the station, nonlinear parameters and constants: a single value for all axes, or a value for each axis."""
     errors = np.sqrt(np.diagonal(fit.shared_covariance)) if fit.shared.size else np.zeros(0)
     rows = [
         _Row(EVERY_AXIS, effect, name, float(fit.shared[q]), float(errors[q]), "rad")
@@ -156,7 +156,7 @@ def _common_rows(fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]
         for name, value in values.items():
             error, text = nonlinear_error.get(effect, {}).get(name, 0.0), known.get(name, "")
             by_axis = zip(AXES, value, strict=True) if isinstance(value, tuple) else ((EVERY_AXIS, value),)
-            rows += [_Row(axis, effect, name, float(one), float(error), text) for axis, one in by_axis]
+            rows += [_Row(axis, effect, name, float(number), float(error), text) for axis, number in by_axis]
     return rows
 
 
@@ -190,17 +190,17 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     common = np.flatnonzero((texts["unit"] == units[0]) & ~is_linear)
     shared, nonlinear = _read_shared(coefficients.iloc[common], model) if common.size else (np.zeros(0), {})
     p = len(column_names(model, nonlinear, axes)[0])
-    own = coefficients["value"].to_numpy()[(letters != EVERY_AXIS) & is_linear]
-    if len(own) != len(units) * len(axes) * p:
+    local = coefficients["value"].to_numpy()[(letters != EVERY_AXIS) & is_linear]
+    if len(local) != len(units) * len(axes) * p:
         raise DataRejected(
-            f"coefficients: {len(own)} rows, the model needs {len(units) * len(axes) * p}; run the fit again"
+            f"coefficients: {len(local)} rows, the model needs {len(units) * len(axes) * p}; run the fit again"
         )
     matrix = np.zeros((len(units), len(axes), p, p))
     row, column = np.tril_indices(p)
     values = covariance["value"].to_numpy().reshape(len(units), len(axes), -1)
     matrix[:, :, row, column] = values
     matrix[:, :, column, row] = values
-    return Calibration(units, model, own.reshape(len(units), len(axes), p), matrix, nonlinear, shared, axes)
+    return Calibration(units, model, local.reshape(len(units), len(axes), p), matrix, nonlinear, shared, axes)
 
 
 def calibration_of(
@@ -231,11 +231,13 @@ def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np
         effect = effects.get(name)
         station = effect.names() if isinstance(effect, StationEffect) else ()
         for row in common[common["effect"] == name].itertuples():
-            value, own = float(row.value), nonlinear.setdefault(name, {})  # pyright: ignore[reportArgumentType]
+            value, parameters = float(row.value), nonlinear.setdefault(name, {})  # pyright: ignore[reportArgumentType]
             if row.name in station:
                 shared.append(value)
             else:
-                own[str(row.name)] = value if row.axis == EVERY_AXIS else (*own.get(str(row.name), ()), value)
+                parameters[str(row.name)] = (
+                    value if row.axis == EVERY_AXIS else (*parameters.get(str(row.name), ()), value)
+                )
     return np.array(shared), {name: values for name, values in nonlinear.items() if values}
 
 
@@ -265,8 +267,10 @@ def unit_texts(effect: SensorEffect, out_unit: str) -> tuple[str, ...]:
     base, *doubled = columns(1.0, 1.0)[0], columns(2.0, 1.0)[0], columns(1.0, 2.0)[0]
     degrees = [[_degree(*values) for values in zip(base, other, strict=True)] for other in doubled]
     return tuple(
-        _per(out_unit, "·".join(name + _POWERS[degree] for name, degree in zip("gK", own, strict=True) if degree > 0))
-        for own in zip(*degrees, strict=True)
+        _per(
+            out_unit, "·".join(name + _POWERS[degree] for name, degree in zip("gK", powers, strict=True) if degree > 0)
+        )
+        for powers in zip(*degrees, strict=True)
     )
 
 

@@ -1,4 +1,4 @@
-"""Reduction of long runs: consecutive dwells of one pose are averaged, or every k-th dwell is kept."""
+"""Reduction of long runs: consecutive dwells of one pose are averaged, or only every k-th dwell is used."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ def condense(dwells: pd.DataFrame) -> pd.DataFrame:
     group = _groups(dwells, numbers, size)
     if group is None:
         return dwells[dwells["dwell"].isin(numbers[::size])]
-    place = pd.Series(group, index=numbers)
+    group_of = pd.Series(group, index=numbers)
     numeric = [c for c in dwells.columns if pd.api.types.is_numeric_dtype(dwells[c]) and c != "dwell"]
     how = {
         c: "sum" if c in _SUMS else BY_COLUMN[c].joined if c in BY_COLUMN else "mean" if c in numeric else "first"
         for c in dwells.columns
         if c not in ("unit", "dwell")
     }
-    grouped = dwells.assign(dwell=dwells["dwell"].map(place)).groupby(["unit", "dwell"], as_index=False, sort=True)
+    grouped = dwells.assign(dwell=dwells["dwell"].map(group_of)).groupby(["unit", "dwell"], as_index=False, sort=True)
     joined = grouped.agg(how)
     for axis in "xyz":
-        # single samples have no scatter of their own: the scatter of the group is used
-        own = joined[f"sd_{axis}"] if f"sd_{axis}" in joined.columns else pd.Series(np.nan, index=joined.index)
-        joined[f"sd_{axis}"] = own.where(own > 0.0, grouped[f"out_{axis}"].std()[f"out_{axis}"])
+        # a single sample has no scatter: the scatter of the group is used
+        scatter = joined[f"sd_{axis}"] if f"sd_{axis}" in joined.columns else pd.Series(np.nan, index=joined.index)
+        joined[f"sd_{axis}"] = scatter.where(scatter > 0.0, grouped[f"out_{axis}"].std()[f"out_{axis}"])
     if "n" not in joined.columns:
         joined["n"] = grouped.size()["size"]
-    whole = grouped.size()["size"] >= 0.5 * size  # the remainder of a stretch is too short for a dwell of its own
-    return joined[whole].dropna(subset=["sd_x", "sd_y", "sd_z"])
+    full = grouped.size()["size"] >= 0.5 * size  # the remainder of a stretch is too short for a dwell
+    return joined[full].dropna(subset=["sd_x", "sd_y", "sd_z"])
 
 
 def _groups(dwells: pd.DataFrame, numbers: NDArray[np.int64], size: int) -> NDArray[np.int64] | None:

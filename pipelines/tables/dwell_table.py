@@ -55,15 +55,15 @@ class DwellTable:
         codes, found_names = frame["unit"].factorize()
         names = [str(name) for name in found_names]
         rank = np.argsort(np.argsort(np.asarray(names, dtype=object), kind="stable"))
-        place, dwell = rank[codes], frame["dwell"].to_numpy()
-        order = np.lexsort((dwell, place))
+        unit_rank, dwell = rank[codes], frame["dwell"].to_numpy()
+        order = np.lexsort((dwell, unit_rank))
         if kinds is not None and "kind" in frame.columns:
             order = order[frame["kind"].isin(list(kinds)).to_numpy()[order]]
         self.frame = frame
         self._order = None if np.array_equal(order, np.arange(len(frame))) else order
-        ranks, unit = np.unique(place[order], return_inverse=True)
+        ranks, unit = np.unique(unit_rank[order], return_inverse=True)
         by_rank = dict(zip(rank.tolist(), names, strict=True))
-        self.units = tuple(str(by_rank[one]) for one in ranks.tolist())
+        self.units = tuple(str(by_rank[rank]) for rank in ranks.tolist())
         self.numbers, number = np.unique(dwell[order], return_inverse=True)
         self._rows = (unit, number)
         self.shape = (len(self.units), len(self.numbers))
@@ -120,7 +120,7 @@ class DwellTable:
 
     def texts(self, name: str) -> list[str]:
         """A column of texts, one for each row."""
-        return [str(one) for one in self._in_order(self.frame[name].to_numpy(dtype=object))]
+        return [str(text) for text in self._in_order(self.frame[name].to_numpy(dtype=object))]
 
     def per_dwell(self, name: str) -> tuple[str, ...]:
         """A text of every dwell, (n,): that of the first unit that has it; empty where the table has no such column."""
@@ -191,18 +191,18 @@ def history_on_grid(history: pd.DataFrame, units: tuple[str, ...], time: Array) 
         parts = [known[np.argsort(times[known], kind="stable")]] * len(units)
     else:
         codes, names = history["unit"].factorize()
-        rank = {unit: place for place, unit in enumerate(units)}
-        place = np.array([rank.get(str(name), -1) for name in names], dtype=np.int64)[codes]
-        known = known[place[known] >= 0]
-        counts = np.bincount(place[known], minlength=len(units))
-        parts = np.split(known[np.lexsort((times[known], place[known]))], np.cumsum(counts)[:-1])
-    if any(len(own) < FEWEST_POINTS for own in parts):
+        rank = {unit: index for index, unit in enumerate(units)}
+        unit_index = np.array([rank.get(str(name), -1) for name in names], dtype=np.int64)[codes]
+        known = known[unit_index[known] >= 0]
+        counts = np.bincount(unit_index[known], minlength=len(units))
+        parts = np.split(known[np.lexsort((times[known], unit_index[known]))], np.cumsum(counts)[:-1])
+    if any(len(rows) < FEWEST_POINTS for rows in parts):
         return None
     every = times[known]
     if every.min() > np.max(time) or every.max() < np.min(time):
         return None
     grid = np.linspace(every.min(), every.max(), max(FEWEST_POINTS, min(HISTORY_POINTS, np.unique(every).size)))
-    return History(grid, np.stack([_at(grid, times[own], values[own]) for own in parts]))
+    return History(grid, np.stack([_at(grid, times[rows], values[rows]) for rows in parts]))
 
 
 def _at(grid: Array, time: Array, values: Array) -> Array:

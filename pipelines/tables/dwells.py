@@ -52,7 +52,7 @@ class Measured:
     reference: str
 
     def pick(self, units: list[int]) -> Measured:
-        """The same for some units."""
+        """The dwells of the units with these indices."""
         index = np.asarray(units, dtype=np.intp)
         values = {field.name: getattr(self.readings, field.name) for field in fields(self.readings)}
         arrays = {name: value[index] for name, value in values.items() if isinstance(value, np.ndarray)}
@@ -102,15 +102,15 @@ class LotTables:
 
     @cached_property
     def parts(self) -> tuple[LotTables, ...]:
-        """The lot in parts whose units have the same dwells: itself where no unit lacks one that another has."""
+        """The lot in parts whose units have the same dwells: the whole lot where no unit lacks a dwell that another has."""
         sets = dwells_of_units(self.dwells)
         if len(set(sets.values())) <= 1:
             return (self,)
         alike: dict[frozenset[int], list[str]] = {}
-        for unit, own in sets.items():
-            alike.setdefault(own, []).append(unit)
+        for unit, numbers in sets.items():
+            alike.setdefault(numbers, []).append(unit)
         units = self.dwells["unit"].astype(str)
-        return tuple(LotTables(self.dwells[units.isin(own)], self.history) for own in alike.values())
+        return tuple(LotTables(self.dwells[units.isin(names)], self.history) for names in alike.values())
 
     @cached_property
     def fitted_kinds(self) -> LotArrays:
@@ -119,12 +119,12 @@ class LotTables:
 
     @cached_property
     def with_gaps(self) -> LotArrays:
-        """The same of units that lack dwells which others have, together."""
+        """The dwells of the fit of all units together, with gaps where a unit lacks a dwell that another has."""
         return lot_arrays(self.dwells, self.history, KINDS, gaps=True)
 
     @cached_property
     def all_kinds(self) -> LotArrays:
-        """All dwells, since an effect with memory depends on the dwell before."""
+        """The dwells of every kind, since an effect with memory depends on the dwell before."""
         if self.dwells["kind"].isin(list(KINDS)).all():
             return self.fitted_kinds
         return lot_arrays(self.dwells, self.history)
@@ -132,14 +132,14 @@ class LotTables:
 
 def dwells_of_units(dwells: pd.DataFrame) -> dict[str, frozenset[int]]:
     """The numbers of the dwells of every unit."""
-    return {str(unit): frozenset(own.tolist()) for unit, own in dwells.groupby("unit", sort=False)["dwell"]}
+    return {str(unit): frozenset(numbers.tolist()) for unit, numbers in dwells.groupby("unit", sort=False)["dwell"]}
 
 
 def lacking(dwells: pd.DataFrame) -> str:
     """A sentence on the dwells that units lack and others have; empty where there are none."""
     sets = dwells_of_units(dwells)
     every = frozenset[int]().union(*sets.values())
-    named = {unit: sorted(every - own) for unit, own in sets.items() if own != every}
+    named = {unit: sorted(every - numbers) for unit, numbers in sets.items() if numbers != every}
     told = (
         f"{unit} lacks {', '.join(map(str, missing[:_SHOWN]))}{' …' if len(missing) > _SHOWN else ''}"
         for unit, missing in named.items()
@@ -303,11 +303,11 @@ def _felt_with_temperature(measurement: Measured, response: Array, scale: Array)
     for unit, theta in enumerate(np.broadcast_to(state.theta, run.shape[:2])):
         if np.linalg.matrix_rank(design(shown[unit], theta)[readings.there[unit]]) < _columns(shown):
             continue  # the poses of the soaks do not determine the axes and their gain's run
-        own = robust_fit(shown[unit], readings.output[unit], theta)
-        felt[unit] = force_along_axes(of_every_axis(own[:, 1:4], axes), force[unit])
-        at_reference = own_terms(own[:, 1:4], axes)
-        gain = own_terms(own[:, 5:], axes) / np.where(at_reference == 0.0, 1.0, at_reference)
-        run[unit][:, axes] = theta[:, None] * (own[:, 4] / scale[unit] + gain * felt[unit][:, axes])
+        coefficients = robust_fit(shown[unit], readings.output[unit], theta)
+        felt[unit] = force_along_axes(of_every_axis(coefficients[:, 1:4], axes), force[unit])
+        at_reference = own_terms(coefficients[:, 1:4], axes)
+        gain = own_terms(coefficients[:, 5:], axes) / np.where(at_reference == 0.0, 1.0, at_reference)
+        run[unit][:, axes] = theta[:, None] * (coefficients[:, 4] / scale[unit] + gain * felt[unit][:, axes])
     return felt, run
 
 
@@ -340,7 +340,7 @@ def shows_misalignment(dwells: pd.DataFrame) -> bool:
 
 
 def undetermined_responses(state: State) -> list[str]:
-    """What cannot be determined from the poses, and what to measure for it."""
+    """Sentences on the responses that the poses do not determine, and on what to measure for them."""
     names = undetermined(state)
     if not names:
         return []

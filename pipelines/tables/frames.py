@@ -77,14 +77,14 @@ def _column(texts: tuple[str, ...]) -> ExtensionArray:
     return pd.array(np.asarray(texts, dtype=object), dtype="str")
 
 
-def empty_table(*, texts: str = "", numbers: str = "", whole: str = "", flags: str = "") -> pd.DataFrame:
+def empty_table(*, texts: str = "", numbers: str = "", integers: str = "", flags: str = "") -> pd.DataFrame:
     """A table without rows whose columns, named in blank-separated lists, have the right types."""
-    return _made(texts, numbers, whole, flags).copy()
+    return _made(texts, numbers, integers, flags).copy()
 
 
 @cache
-def _made(texts: str, numbers: str, whole: str, flags: str) -> pd.DataFrame:
-    kinds = {"str": texts, "float64": numbers, "int64": whole, "bool": flags}
+def _made(texts: str, numbers: str, integers: str, flags: str) -> pd.DataFrame:
+    kinds = {"str": texts, "float64": numbers, "int64": integers, "bool": flags}
     return pd.DataFrame({name: pd.Series(dtype=kind) for kind, names in kinds.items() for name in names.split()})
 
 

@@ -41,12 +41,12 @@ def leave_out(dwells: pd.DataFrame, named: Sequence[tuple[str, int]]) -> pd.Data
     """
     gone = np.zeros(len(dwells), dtype=bool)
     for unit, dwell in named:
-        own = (dwells["unit"].astype(str) == unit).to_numpy() & (dwells["dwell"] == dwell).to_numpy()
-        if not own.any():
+        rows = (dwells["unit"].astype(str) == unit).to_numpy() & (dwells["dwell"] == dwell).to_numpy()
+        if not rows.any():
             there = ", ".join(dict.fromkeys(dwells["unit"].astype(str)))
             raise DataRejected(
                 f"--leave-out: dwell {dwell} of unit {unit} is not there (units {there}, dwells "
                 f"{int(dwells['dwell'].min())} to {int(dwells['dwell'].max())}); name another"
             )
-        gone |= own
+        gone |= rows
     return dwells[~gone].reset_index(drop=True)

@@ -74,28 +74,28 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
     NotIdentified
         As :func:`inertial.fits.ellipsoid.fit_ellipsoid`.
     """
-    kept = readings.there[unit].copy()
-    _refuse_quiet(readings.output[unit, kept])
-    heat = _heat(readings, unit, kept)
+    used = readings.there[unit].copy()
+    _refuse_quiet(readings.output[unit, used])
+    heat = _heat(readings, unit, used)
     warm = heat is not None and float(np.ptp(heat)) > WARM and shape == "nine"
     unknowns = {"six": 6, "nine": 9}[shape] + (3 if warm else 0)
-    warm = warm and int(kept.sum()) > unknowns + _SPARE
+    warm = warm and int(used.sum()) > unknowns + _SPARE
     try:
-        fit = _fitted(readings, unit, kept, shape, warm=warm)
+        fit = _fitted(readings, unit, used, shape, warm=warm)
     except NotIdentified:
-        refuse_one_pose(readings.output[unit, kept])
+        refuse_one_pose(readings.output[unit, used])
         raise
     for _ in range(_ROUNDS):
-        if int(kept.sum()) < unknowns + _SPARE:
+        if int(used.sum()) < unknowns + _SPARE:
             break
-        far = _far(readings, unit, fit, kept, warm=warm)
-        if not far.any() or int((kept & ~far).sum()) < unknowns + _SPARE:
+        far = _far(readings, unit, fit, used, warm=warm)
+        if not far.any() or int((used & ~far).sum()) < unknowns + _SPARE:
             break
         try:
-            fit = _fitted(readings, unit, kept & ~far, shape, warm=warm)
+            fit = _fitted(readings, unit, used & ~far, shape, warm=warm)
         except NotIdentified:
             break
-        kept &= ~far
+        used &= ~far
     return fit
 
 
@@ -125,32 +125,32 @@ def _refuse_quiet(output: Array) -> None:
         )
 
 
-def _far(readings: Readings, unit: int, fit: EllipsoidFit, kept: NDArray[np.bool_], *, warm: bool) -> NDArray[np.bool_]:
-    """The dwell that is farthest off among those kept, if it is far beyond the scatter of the others."""
+def _far(readings: Readings, unit: int, fit: EllipsoidFit, used: NDArray[np.bool_], *, warm: bool) -> NDArray[np.bool_]:
+    """Flags (n,) of the used dwell that is farthest from the ellipsoid, if it is far beyond the scatter of the others."""
     heat = _heat(readings, unit, readings.there[unit]) if warm else None
-    left = np.zeros(kept.size)
+    left = np.zeros(used.size)
     there = readings.there[unit]
     left[there] = np.abs(np.linalg.norm(fit.apply(readings.output[unit, there], heat), axis=1) - 1.0)
-    typical = float(np.median(left[kept])) / 0.6745
-    worst = int(np.argmax(np.where(kept, left, 0.0)))
-    far = np.zeros(kept.size, dtype=bool)
+    typical = float(np.median(left[used])) / 0.6745
+    worst = int(np.argmax(np.where(used, left, 0.0)))
+    far = np.zeros(used.size, dtype=bool)
     far[worst] = left[worst] > _FAR * typical
     return far
 
 
-def _fitted(readings: Readings, unit: int, kept: NDArray[np.bool_], shape: Shape, *, warm: bool) -> EllipsoidFit:
-    output = readings.output[unit, kept]
-    heat = _heat(readings, unit, kept) if warm else None
+def _fitted(readings: Readings, unit: int, used: NDArray[np.bool_], shape: Shape, *, warm: bool) -> EllipsoidFit:
+    output = readings.output[unit, used]
+    heat = _heat(readings, unit, used) if warm else None
     first = fit_ellipsoid(output, shape=shape, temperature=heat)
     size = np.linalg.norm(first.apply(output, heat), axis=1)
-    axes = _white(readings, unit, first, np.ones(kept.size))[kept]
+    axes = _white(readings, unit, first, np.ones(used.size))[used]
     direction = first.apply(output, heat) / np.where(size > 0.0, size, 1.0)[:, None]
     error = np.sqrt(np.sum((direction * axes) ** 2, axis=1))
-    return fit_ellipsoid(output, shape=shape, temperature=heat, time=readings.time[unit, kept], error=error)
+    return fit_ellipsoid(output, shape=shape, temperature=heat, time=readings.time[unit, used], error=error)
 
 
 def _heat(readings: Readings, unit: int, there: NDArray[np.bool_]) -> Array | None:
-    """Temperatures of a unit's dwells; None where there are none, or one of them is missing."""
+    """Temperatures of a unit's dwells; None where none are recorded, or one is missing."""
     temperature = readings.temperature if readings.temperature is not None else readings.chamber
     if temperature is None or not np.all(np.isfinite(temperature[unit, there])):
         return None

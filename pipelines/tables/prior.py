@@ -61,7 +61,7 @@ def prior_sentence(prior: PriorDocument) -> str:
     if prior["own"]:
         parts.append(f"own earlier calibrations of {', '.join(prior['own'])} count")
     for group in dict.fromkeys(prior["groups"].values()):
-        units = [unit for unit, own in prior["groups"].items() if own == group]
+        units = [unit for unit, family in prior["groups"].items() if family == group]
         parts.append(f"earlier units of {group} count for {', '.join(units)}")
     if prior["widened"]:
         wide = ", ".join(f"{name} {factor:.1f} times" for name, factor in prior["widened"].items())

@@ -35,7 +35,7 @@ def generator() -> np.random.Generator:
 def sound_lot(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], left_out: Collection[str] = ()
 ) -> tuple[Measured, list[Fault], Lot | None]:
-    """Readings, data faults, and the lot of the units without a fault, g; no lot where every unit has one.
+    """Readings, data faults, and the lot of the units without a fault, g; no lot where every unit has a fault.
 
     Parameters
     ----------
@@ -79,10 +79,10 @@ def gaps(measurement: Measured, faults: Sequence[Fault], left_out: Collection[st
     """
     faulty = {fault.unit for fault in faults}
     parts: list[str] = []
-    for place, unit in enumerate(measurement.units):
-        missing = (int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, place))
+    for index, unit in enumerate(measurement.units):
+        missing = (int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, index))
         numbers = [n for n in missing if f"{unit}:{n}" not in left_out]
-        if numbers and place not in faulty:
+        if numbers and index not in faulty:
             shown = ", ".join(map(str, numbers[:_SHOWN])) + (", …" if len(numbers) > _SHOWN else "")
             parts.append(f"{unit} {len(numbers)} ({shown})")
     if not parts:

@@ -53,7 +53,7 @@ def summarised(
         for record, tables in by_record(samples)
         for row in _of_record(record, tables, full, zero_output, AXES[:axes])
     ]
-    return pd.DataFrame(rows) if rows else empty_table(texts="unit kind", numbers=NUMBERS, whole=WHOLE)
+    return pd.DataFrame(rows) if rows else empty_table(texts="unit kind", numbers=NUMBERS, integers=WHOLE)
 
 
 def unit_means(table: pd.DataFrame) -> dict[str, Array]:
@@ -90,39 +90,40 @@ def _parts(
     )
     output = table[list(letters)].to_numpy(dtype=float)
     for k, (unit, places) in enumerate(groups.indices.items()):
-        own = output[places]
+        samples = output[places]
         limit = float(full.get((record, unit), 0.0))
-        bad = np.argwhere(~np.isfinite(own))
-        ends = np.argwhere(np.abs(own - zero_output) >= limit) if limit > 0.0 else bad[:0]
+        bad = np.argwhere(~np.isfinite(samples))
+        ends = np.argwhere(np.abs(samples - zero_output) >= limit) if limit > 0.0 else bad[:0]
         row, axis = bad[0].tolist() if len(bad) else (0, 0)
         part = {
-            "n": len(own), "mean": mean[k], "sd": sd[k], "low": low[k], "high": high[k],
-            "wild_count": len(bad), "wild_row": row, "wild_axis": axis, "wild_value": float(own[row, axis]) if len(bad) else 0.0,
+            "n": len(samples), "mean": mean[k], "sd": sd[k], "low": low[k], "high": high[k],
+            "wild_count": len(bad), "wild_row": row, "wild_axis": axis,
+            "wild_value": float(samples[row, axis]) if len(bad) else 0.0,
             "clipped": len(ends), "clipped_axis": int(ends[0][1]) if len(ends) else 0,
         }  # fmt: skip
         yield str(unit), part
 
 
-def _joined(one: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
+def _joined(earlier: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
     """Merge two parts of a record: Chan, Golub & LeVeque, Amer. Statist. 37 (1983) 242, for mean and variance."""
-    n = one["n"] + more["n"]
+    n = earlier["n"] + more["n"]
     with np.errstate(all="ignore"):  # values that are not finite stay so, and their unit is refused
-        apart = more["mean"] - one["mean"]
-        squares = apart**2 * (one["n"] * more["n"] / n)
-        for part in (one, more):
+        apart = more["mean"] - earlier["mean"]
+        squares = apart**2 * (earlier["n"] * more["n"] / n)
+        for part in (earlier, more):
             squares = squares + (part["sd"] ** 2 * (part["n"] - 1) if part["n"] > 1 else 0.0)
-        mean, sd = one["mean"] + apart * (more["n"] / n), np.sqrt(squares / (n - 1))
-    first_wild = one if one["wild_count"] else {**more, "wild_row": more["wild_row"] + one["n"]}
-    first_clipped = one if one["clipped"] else more
-    return one | {
+        mean, sd = earlier["mean"] + apart * (more["n"] / n), np.sqrt(squares / (n - 1))
+    first_wild = earlier if earlier["wild_count"] else {**more, "wild_row": more["wild_row"] + earlier["n"]}
+    first_clipped = earlier if earlier["clipped"] else more
+    return earlier | {
         "n": n,
         "mean": mean,
         "sd": sd,
-        "low": np.minimum(one["low"], more["low"]),
-        "high": np.maximum(one["high"], more["high"]),
-        "wild_count": one["wild_count"] + more["wild_count"],
+        "low": np.minimum(earlier["low"], more["low"]),
+        "high": np.maximum(earlier["high"], more["high"]),
+        "wild_count": earlier["wild_count"] + more["wild_count"],
         **{name: first_wild[name] for name in ("wild_value", "wild_row", "wild_axis")},
-        "clipped": one["clipped"] + more["clipped"],
+        "clipped": earlier["clipped"] + more["clipped"],
         "clipped_axis": first_clipped["clipped_axis"],
     }
 
@@ -137,7 +138,7 @@ class Outlier(NamedTuple):
 
 
 def first_outlier(output: Array, lsb: float, full_scale: float) -> Outlier | None:
-    """The first sample that lies too far from the median of the samples (n, 3) of one record; None without one, or for a small n.
+    """The first sample too far from the median of the samples (n, 3) of one record; None where none is, or for a small n.
 
     The spread is half the width of the middle 68 %, which no outlier widens. It takes all samples at once: percentiles of several
     tables do not follow from those of each, so it is no column of :func:`summarised`.
@@ -159,9 +160,9 @@ def first_outlier(output: Array, lsb: float, full_scale: float) -> Outlier | Non
 
 def means(summaries: pd.DataFrame, kinds_but: Sequence[str] = ()) -> pd.DataFrame:
     """Unit, record and mean samples x, y, z of the axes with an output, without some kinds."""
-    kept = summaries[~summaries["kind"].isin(list(kinds_but))]
-    names = dict(zip(there(kept, MEANS), AXES, strict=False))
-    return kept[["unit", "record", *names]].rename(columns=names)
+    rows = summaries[~summaries["kind"].isin(list(kinds_but))]
+    names = dict(zip(there(rows, MEANS), AXES, strict=False))
+    return rows[["unit", "record", *names]].rename(columns=names)
 
 
 def there(table: pd.DataFrame, names: Sequence[str]) -> list[str]:

@@ -37,7 +37,7 @@ State = TypeVar("State", bound="PageState")
 
 
 def _written(body: dict[str, Any]) -> dict[str, Any]:
-    """The body, whose texts are ones that files can have as names and answers can quote."""
+    """The body of a request, whose texts may be file names and may be quoted in answers."""
     for key, value in body.items():
         for text in (key, value):
             if isinstance(text, str) and any(letter == "\0" or "\ud800" <= letter <= "\udfff" for letter in text):
@@ -188,10 +188,10 @@ def table_csv(rows: Sequence[Mapping[str, Any]], name: str) -> Response:
 
 
 def run_table(bench: Workbench, run: str, name: str) -> pd.DataFrame:
-    """A table of a run, cached while its manifest is the same."""
+    """A table of a run, cached while its manifest does not change."""
     stored = bench.archive.run(run)
-    place = stored.path / f"{name}.json"
-    when = place.stat().st_mtime_ns if isinstance(place, Path) and place.is_file() else 0
+    path = stored.path / f"{name}.json"
+    when = path.stat().st_mtime_ns if isinstance(path, Path) and path.is_file() else 0
     return _table(bench.settings.archive, stored.id, name, when)
 
 
@@ -223,12 +223,12 @@ def samples_of(bench: Workbench, run: str, dwell: str) -> tuple[pd.DataFrame, st
         tables = [samples[samples["record"] == record]]
     else:
         raise WrongUse(f"run {stored.id} was imported as dwells: its samples were not recorded")
-    kept = [own for one in tables if len(own := one[one["unit"] == unit])]
-    if not kept:
+    samples_of_unit = [of_unit for part in tables if len(of_unit := part[part["unit"] == unit])]
+    if not samples_of_unit:
         raise WrongUse(f"run {stored.id}: no samples of dwell {number} of unit {unit} are stored")
     pose = str(row.get("pose", ""))
     title = f"Unit {unit}, dwell {number}{', pose ' + pose if pose else ''}"
-    return pd.concat(kept, ignore_index=True), str(row.get("out_unit", "")), title
+    return pd.concat(samples_of_unit, ignore_index=True), str(row.get("out_unit", "")), title
 
 
 @cache
@@ -236,9 +236,9 @@ def static_version() -> str:
     """Part of the addresses of scripts and styles that changes with their content, so that browsers can cache them."""
     digest = hashlib.sha256()
     shared = files("pipelines.drawing") / "paint.js"
-    for place in (*sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda path: path.name), shared):
-        if place.is_file():
-            digest.update(place.name.encode() + place.read_bytes())
+    for file in (*sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda path: path.name), shared):
+        if file.is_file():
+            digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()[:12]
 
 
@@ -252,8 +252,8 @@ def _environment() -> Environment:
         lambda name: (_TEMPLATES.get(name) or files("pipelines.workbench") / "templates" / name).read_text("utf-8")
     )
     made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    own: dict[str, Any] = {"short": short, "plain_reason": plain_reason, "tuple_of": tuple, "first_of": first_of}
-    made.filters.update(own, without_nothing=without_nothing)
+    filters: dict[str, Any] = {"short": short, "plain_reason": plain_reason, "tuple_of": tuple, "first_of": first_of}
+    made.filters.update(filters, without_nothing=without_nothing)
     return made
 
 

@@ -122,7 +122,7 @@ def _refused_to_read(scope: Scope, headers: Headers, settings: WorkbenchSettings
 
 
 def _local(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> bool:
-    """Whether the request is one of this machine; by HTTP/1.0, which no browser uses, some proxies ask without a header."""
+    """Whether the request came from this machine; by HTTP/1.0, which no browser uses, some proxies ask without a header."""
     return (
         settings.local
         and not settings.proxied
@@ -200,7 +200,7 @@ def _entering(scope: Scope, settings: WorkbenchSettings) -> RedirectResponse | P
         return PlainTextResponse(
             "workbench: this is not the token of this service; use the address that it printed", 403
         )
-    rest = urlencode([one for one in query if one[0] != "token"])
+    rest = urlencode([pair for pair in query if pair[0] != "token"])
     headers = Headers(scope=scope)
     bound = _bound(headers, settings)
     value = session(settings.token, bound)
@@ -242,7 +242,7 @@ def session_holds(token: str, origin: str, value: str) -> bool:
 
 
 def change_proof(token: str, origin: str, value: str) -> str:
-    """What the page of a session sends with its changes."""
+    """The token that the page of a session sends with its changes."""
     return _code(token, "change", origin, value)
 
 

@@ -40,7 +40,7 @@ def like(text: str) -> str:
 
 
 def options(values: Mapping[str, str]) -> list[str]:
-    """Options of a command line with their values; those without one are omitted."""
+    """Options of a command line with their values; options without a value are omitted."""
     return [word for name, value in values.items() if value for word in (name, value)]
 
 
@@ -79,7 +79,7 @@ class PageState(BaseModel):
         for name, about in type(self).model_fields.items():
             value = getattr(new, name)
             if value != about.default:
-                pairs += [(name, str(one)) for one in (value if isinstance(value, tuple) else (value,))]
+                pairs += [(name, str(item)) for item in (value if isinstance(value, tuple) else (value,))]
         return urlencode(pairs)
 
     def address(self, **changes: Any) -> str:

@@ -26,7 +26,7 @@ class AxisOrders:
     silence_s: float
 
     def run(self) -> None:
-        """All steps in order; a step that fails ends only itself."""
+        """Take all steps in order; a step that fails does not prevent the next."""
         self.orders.step("state of the drive", self._state)
         self.orders.step("a degree and back", self._turn)
         self.orders.step("stop on the way", self._stop)
@@ -146,7 +146,7 @@ class AxisOrders:
         self._moved(axis, start, stood)
 
     def _interlock(self) -> None:
-        """What the drive says while a person holds its emergency stop."""
+        """Check the state of the drive while a person holds its emergency stop."""
         what = "reports its emergency stop"
         text = "press the emergency stop of the drive, then type the word; nothing is ordered"
         before = axis_of(self.orders.target).state()

@@ -22,7 +22,7 @@ class ChamberOrders:
     silence_s: float
 
     def run(self) -> None:
-        """All steps in order; a step that fails ends only itself."""
+        """Take all steps in order; a step that fails does not prevent the next."""
         self.orders.step("state of the controller", self._state)
         self.orders.step("a kelvin and back", self._set)
         self.orders.step("off and on", self._switch)
@@ -36,7 +36,7 @@ class ChamberOrders:
         self.orders.add("ready for a set point", "held", f"air {air:.2f} °C, mode {chamber.mode()}")
 
     def _set(self) -> None:
-        """A set point a kelvin away, with its read-back, and the old one again."""
+        """A set point a kelvin away, with its read-back, and the old set point again."""
         what = "takes a set point and reads it back"
         chamber = chamber_of(self.orders.target)
         before = chamber.set_point()

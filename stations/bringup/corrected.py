@@ -1,4 +1,4 @@
-"""The profile with corrected rows, as a file of its own beside the original; comments of the original stay."""
+"""The profile with corrected rows, as a separate file beside the original; comments of the original stay."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The keeper of a bring-up: a process of its own that leaves the device as it was found when the bring-up is gone.
+"""The keeper of a bring-up: a separate process that leaves the device as it was found when the bring-up is gone.
 
 Its standard input gives it the device, then what was found, then that an axis may move, then that all is done. When that pipe
 ends without the last message, as after a kill, it stops the axis, writes back what had changed, and tries again until it could.

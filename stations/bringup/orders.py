@@ -17,7 +17,7 @@ PAUSE_S = 0.5
 
 @dataclass
 class Orders:
-    """The orders of one bring-up; ``blocked`` says why no further one is given."""
+    """The orders of one bring-up; ``blocked`` says why no further order is given."""
 
     target: Target
     findings: Findings
@@ -28,7 +28,7 @@ class Orders:
     note: Callable[[str], None] = field(default=lambda _: None)
 
     def step(self, name: str, act: Callable[[], None]) -> None:
-        """One step; what the station raises ends it and is a finding."""
+        """Take one step; an error of the station ends it and is a finding."""
         self.note(f"step: {name}")
         try:
             act()
@@ -62,7 +62,7 @@ class Orders:
         self.keeper.keep(self.found)
 
     def again(self, make: Callable[[], Made]) -> Made:
-        """A new connection to a device that may still be away, such as one that restarts."""
+        """A new connection to a device that may still be away, such as a restarting device."""
         end = time.monotonic() + RECONNECT_S
         while True:
             try:

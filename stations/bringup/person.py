@@ -14,7 +14,7 @@ class Person(Protocol):
         """Shows a line."""
 
     def ask(self, question: str) -> str:
-        """What is typed in answer; empty for a skipped question, and where nobody types."""
+        """The typed answer; empty for a skipped question, and where nobody types."""
         ...
 
 
@@ -45,7 +45,7 @@ class Findings:
     def add(
         self, part: Part, what: str, verdict: Verdict, found: str = "", expected: str = "", remedy: str = ""
     ) -> None:
-        """Another point; what held needs no remedy."""
+        """Add a point; a point that held needs no remedy."""
         self.points.append(Point(part, what, verdict, found, expected, "" if verdict == "held" else remedy))
 
     def change(self, register: str, key: str, value: object) -> None:
@@ -53,5 +53,5 @@ class Findings:
         self.changes.setdefault(register, {})[key] = value
 
     def count(self, verdict: Verdict) -> int:
-        """How many points have a verdict."""
+        """Number of points with this verdict."""
         return sum(point.verdict == verdict for point in self.points)

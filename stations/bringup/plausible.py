@@ -29,8 +29,8 @@ def plausible(register: Register, value: Value) -> bool | None:
     if isinstance(value, str):
         return None if not value.strip() else value.isprintable() and value.isascii()
     if isinstance(value, list):
-        judged = [plausible(register.model_copy(update={"count": 1}), one) for one in value]
-        return None if all(one is None for one in judged) else all(one is not False for one in judged)
+        judged = [plausible(register.model_copy(update={"count": 1}), element) for element in value]
+        return None if all(element is None for element in judged) else all(element is not False for element in judged)
     if not math.isfinite(value):
         return False
     if register.enumeration:
@@ -63,7 +63,7 @@ def _bits(register: Register, value: int) -> bool | None:
 
 
 def votes(profile: Profile, words: Mapping[str, Sequence[int]], order: WordOrder, *, orderly: bool) -> tuple[int, int]:
-    """How many registers have a plausible and how many an implausible value in a word order.
+    """Numbers of registers with a plausible and with an implausible value in a word order.
 
     words : by register, as they were read
     orderly : only registers of two words, which alone depend on the order; else all
@@ -80,7 +80,7 @@ def votes(profile: Profile, words: Mapping[str, Sequence[int]], order: WordOrder
 
 
 def depends_on_order(register: Register) -> bool:
-    """Whether its value depends on the order of its words or bytes."""
+    """Whether the value of a register depends on the order of its words or bytes."""
     return register.type in {"uint32", "int32", "float32"}
 
 

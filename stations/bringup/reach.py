@@ -22,7 +22,7 @@ MISSING = "bring-up: nothing answers"
 
 @dataclass
 class Answer:
-    """What a device with some id answers to the registers of the profile."""
+    """The answers of a device with some id to reads of the registers of the profile."""
 
     device_id: int
     words: dict[str, list[int]]
@@ -92,7 +92,7 @@ def probes(profile: Profile) -> list[Register]:
 
 
 def _answers(target: Target, given_id: int, *, search_line: bool, person: Person) -> list[Answer]:
-    """What answers at any id, at the first line setting at which anything does."""
+    """The answers of all ids, at the first line setting with any answer."""
     ids = [given_id] if given_id else list(FIRST_IDS)
     for device in _settings(target.link.device, search_line=search_line):
         target.link.device = device
@@ -122,17 +122,17 @@ def _settings(device: Device, *, search_line: bool) -> Iterator[Device]:
 
 
 def _at(link: GatedLink, profile: Profile, device_id: int) -> Answer | None:
-    """What answers at one id: at the addresses of the profile, else one beside them or in the other space; None for silence."""
-    own = _read(link, profile, device_id, probes(profile))
-    if own is None:
+    """What answers at an id: at the addresses of the profile, else shifted by one or in the other space; None for silence."""
+    stated = _read(link, profile, device_id, probes(profile))
+    if stated is None:
         return None
-    if own.words and own.votes[1] <= own.votes[0] and len(own.refused) < len(own.words):
-        return own
+    if stated.words and stated.votes[1] <= stated.votes[0] and len(stated.refused) < len(stated.words):
+        return stated
     spaces = {r.space for r in profile.registers}
     others = [*((shift, "") for shift in SHIFTS[1:])]
     if len(spaces) == 1 and (other := OTHER_SPACE.get(next(iter(spaces)))):
         others += [(shift, other) for shift in SHIFTS]
-    tried = [own]
+    tried = [stated]
     for shift, space in others:
         if min(r.address for r in profile.registers) + shift < 0:
             continue
@@ -140,7 +140,7 @@ def _at(link: GatedLink, profile: Profile, device_id: int) -> Answer | None:
         if answer is not None:
             answer.shift, answer.space = shift, space
             tried.append(answer)
-    return max(tried, key=lambda answer: (answer.score, answer is own))
+    return max(tried, key=lambda answer: (answer.score, answer is stated))
 
 
 def _read(link: GatedLink, profile: Profile, device_id: int, registers: Sequence[Register]) -> Answer | None:
@@ -167,7 +167,7 @@ def _read(link: GatedLink, profile: Profile, device_id: int, registers: Sequence
 
 
 def _best(target: Target, answers: Iterable[Answer], given_id: int) -> Answer:
-    """The one answer that is of the profile; several equally good ones are for the person to decide."""
+    """The answer that is of the profile; between several equally good answers the person decides."""
     ranked = sorted(answers, key=lambda answer: -answer.score)
     best = ranked[0]
     alike = [answer.device_id for answer in ranked if answer.score == best.score]

@@ -64,7 +64,7 @@ class BringUp:
         self.target = Target(SingleLink(self.device, self.profile, self.timeout_s), self.profile)
 
     def run(self) -> None:
-        """All steps; whatever ends them, the device is as it was found afterwards, or its keeper goes on trying.
+        """Take all steps; however they end, the device is then put back as it was found, or its keeper goes on trying.
 
         Raises StationError: nothing answers, another run drives the device, or it cannot be left as it was found now.
         """

@@ -23,7 +23,7 @@ ON_PANEL = " on the panel"
 
 @dataclass
 class Survey:
-    """What the registers hold, and how long answers took, s."""
+    """Values of the registers, and times of the answers, s."""
 
     values: dict[str, Value] = field(default_factory=dict[str, Value])
     seconds: list[float] = field(default_factory=list[float])
@@ -40,18 +40,18 @@ class Survey:
 
 
 def survey(target: Target, findings: Findings, person: Person) -> Survey:
-    """Reads every register or command of the profile, each in a request of its own."""
+    """Reads every register or command of the profile, each in a separate request."""
     found, values = Survey(), target.values()
     for entry in (*target.profile.registers, *target.profile.commands):
         if isinstance(entry, Register) and entry.access == "write":
             findings.add("register", entry.name, "not tried", "write only")
             continue
-        values = _one(target, values, entry, found, findings)
+        values = _read(target, values, entry, found, findings)
     if isinstance(values, Registers):
         _groups(values, findings)
     _own_limits(target, found, findings)
-    own = [point for point in findings.points if point.part == "register"]
-    differ = [f"{point.what} ({point.found})" for point in own if point.verdict == "differs"]
+    points = [point for point in findings.points if point.part == "register"]
+    differ = [f"{point.what} ({point.found})" for point in points if point.verdict == "differs"]
     person.tell(
         f"{len(found.values)} values read; "
         + (f"differ: {', '.join(differ)}" if differ else "none differs from its profile")
@@ -59,8 +59,8 @@ def survey(target: Target, findings: Findings, person: Person) -> Survey:
     return found
 
 
-def _one(target: Target, values: Values, entry: Register | Command, found: Survey, findings: Findings) -> Values:
-    """Reads one value; the values on a new connection where the old one was lost."""
+def _read(target: Target, values: Values, entry: Register | Command, found: Survey, findings: Findings) -> Values:
+    """Reads one value; the values on a new connection where the old connection was lost."""
     name = entry.name
     begun = time.monotonic()
     try:
@@ -83,7 +83,7 @@ def _one(target: Target, values: Values, entry: Register | Command, found: Surve
 
 
 def _judge(findings: Findings, entry: Register | Command, value: Value) -> None:
-    """What the value says of its register: inside its limits, named, possible."""
+    """Findings on the value of a register: whether it is inside its limits, named, possible."""
     shown, unit, (low, high) = told(entry, value), entry.unit, limits_of(entry)
     numbers = value if isinstance(value, list) else [] if isinstance(value, str) else [value]
     if numbers and not all(low <= number <= high for number in numbers):
@@ -119,21 +119,21 @@ def _own_limits(target: Target, found: Survey, findings: Findings) -> None:
     if not target.profile.has("set_point"):
         return
     entry = target.profile.entry("set_point")
-    for name, own, side, sign in (
+    for name, stated, side, sign in (
         ("set_point_low", entry.minimum, "minimum", 1.0),
         ("set_point_high", entry.maximum, "maximum", -1.0),
     ):
         limit = found.values.get(name)
-        if own is None or not isinstance(limit, int | float) or not math.isfinite(limit):
+        if stated is None or not isinstance(limit, int | float) or not math.isfinite(limit):
             continue
         what = f"{side} of set_point"
-        if sign * own < sign * limit:
+        if sign * stated < sign * limit:
             text = f"the controller allows {limit:g} {entry.unit}"
             remedy = "narrow the profile's limit to the controller's, or widen that at its panel"
-            findings.add("register", what, "differs", text, f"{own:g} {entry.unit} of the profile", remedy)
+            findings.add("register", what, "differs", text, f"{stated:g} {entry.unit} of the profile", remedy)
             findings.change("set_point", side, float(limit))
         else:
-            findings.add("register", what, "held", f"{own:g} {entry.unit}", f"inside {limit:g}")
+            findings.add("register", what, "held", f"{stated:g} {entry.unit}", f"inside {limit:g}")
 
 
 def panel(target: Target, findings: Findings, person: Person) -> None:

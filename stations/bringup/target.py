@@ -67,18 +67,18 @@ class Target:
 
     @property
     def text(self) -> bool:
-        """Whether it speaks in lines of text."""
+        """Whether the device speaks in lines of text."""
         return self.link.device.link in TEXT_CARRIERS
 
     def values(self) -> Values:
-        """Its values by name, on a new connection."""
+        """Access to the device's values by name, on a new connection."""
         self.link.profile = self.profile
         if self.text:
             return Commands(NAME, self.link.lines(), self.profile)
         return Registers(NAME, self.link.registers(), self.link.device.device_id, self.profile)
 
     def registers(self) -> Registers:
-        """Its registers, on a new connection."""
+        """Access to the device's registers, on a new connection."""
         values = self.values()
         if not isinstance(values, Registers):
             raise RecipeInvalid(f"profile {self.profile.name}: registers are needed, it has commands", key="links")
@@ -110,7 +110,7 @@ KEPT = {
 
 @dataclass
 class AsFound:
-    """What the device held before the first order; ``moved`` says whether an axis has been ordered to move."""
+    """State of the device before the first order; ``moved`` says whether an axis has been ordered to move."""
 
     values: dict[str, Value] = field(default_factory=dict[str, Value])
     moved: bool = False
@@ -122,8 +122,8 @@ def limits_of_orders(profile: Profile, speed: float = SPEED_DEG_S) -> Limits:
     slowest, fastest = bounds_of(profile, "speed", (0.0, speed))
     slow = max(min(speed, fastest), slowest, smallest_speed(profile))
     least, most = bounds_of(profile, "acceleration", (0.0, ACCELERATION_DEG_S2))
-    kept = max(min(ACCELERATION_DEG_S2, most), least)
-    return Limits(outer_deg=(low, high), speed_deg_s=slow, acceleration_deg_s2=kept)
+    acceleration = max(min(ACCELERATION_DEG_S2, most), least)
+    return Limits(outer_deg=(low, high), speed_deg_s=slow, acceleration_deg_s2=acceleration)
 
 
 def smallest_speed(profile: Profile) -> float:
@@ -153,7 +153,7 @@ def chamber_of(target: Target) -> ThermalChamber:
 
 
 def as_found(target: Target) -> AsFound:
-    """What the device holds now, of what an order may change."""
+    """The present values of all that an order may change."""
     found, values = AsFound(), target.values()
     for name in KEPT.get(target.profile.kind, ()):
         if target.profile.has(name) and target.profile.entry(name).writable:

@@ -23,10 +23,12 @@ def adapters() -> dict[str, type[TableAxis | ThermalChamber | Equipment]]:
     by_family: dict[str, type[TableAxis | ThermalChamber | Equipment]] = {}
     for module in pkgutil.iter_modules(families.__path__):
         content = vars(import_module(f"{families.__name__}.{module.name}")).values()
-        own = [
-            one for one in content if isinstance(one, type) and issubclass(one, (TableAxis, ThermalChamber, Equipment))
+        classes = [
+            kind
+            for kind in content
+            if isinstance(kind, type) and issubclass(kind, (TableAxis, ThermalChamber, Equipment))
         ]
-        concrete = [one for one in own if not isabstract(one)]
+        concrete = [kind for kind in classes if not isabstract(kind)]
         if len(concrete) != 1:
             raise LookupError(
                 f"stations/devices/families/{module.name}.py: {len(concrete)} adapters, 1 is needed; give it one complete "

@@ -39,7 +39,7 @@ class ThermalChamber(ABC):
         """Refuses a controller that would not follow a set point: an alarm, a running program, another unit."""
 
     def order(self, temperature: float) -> None:
-        """Writes the set point; the same value twice has no further effect."""
+        """Writes the set point; a repeated value has no further effect."""
         self._values.write("set_point", temperature)
 
     def check(self, temperature: float) -> None:
@@ -80,7 +80,7 @@ class ThermalChamber(ABC):
         return self._values.number("set_point")
 
     def temperature(self) -> float:
-        """The air temperature, °C; a physically impossible one is refused."""
+        """The air temperature, °C; a physically impossible reading is refused."""
         value = self._values.number("temperature")
         if not (math.isfinite(value) and PLAUSIBLE_C[0] < value < PLAUSIBLE_C[1]):
             raise StationRefused(

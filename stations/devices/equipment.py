@@ -43,7 +43,7 @@ class Recording:
     """The outputs of the units by slot, and the reference sensor, each on its own time base.
 
     outputs : (n, 3) by slot, unit of the output
-    rate_hz : nominal rate of the outputs, Hz; a device with a clock of its own departs from it
+    rate_hz : nominal rate of the outputs, Hz; a device with its own clock departs from it
     reference : (m, 3), g, in the axes of the units
     reference_rate_hz : of the reference, Hz
     """
@@ -71,9 +71,9 @@ class Recording:
 def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, float] = STANDARD_GRAVITY) -> Recording:
     """The recording in a result file; a file without rate or unit is refused.
 
-    slots : whose channels are wanted; one that is not there is left out
+    slots : whose channels are wanted; missing channels are left out
     name : of the equipment, for messages
-    units : allowed units of the reference, with their number in the one that is returned
+    units : allowed units of the reference, with their number per returned unit
     """
     from scipy.io import loadmat  # a third of a second
 
@@ -90,7 +90,7 @@ def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, 
     if unit not in units:
         raise StationRefused(f"{name}: reference in '{unit}', {' or '.join(units)} is needed; correct the set-up")
     found = ((slot, content[f"slot_{slot}"]) for slot in slots if f"slot_{slot}" in content)
-    outputs = {slot: np.atleast_2d(np.asarray(own, dtype=np.float64)) for slot, own in found}
+    outputs = {slot: np.atleast_2d(np.asarray(channels, dtype=np.float64)) for slot, channels in found}
     reference = np.asarray(content["reference"], dtype=np.float64) / units[unit]
     return Recording(outputs, float(content["rate_hz"]), reference, float(content["reference_rate_hz"]))
 

@@ -135,9 +135,9 @@ class Slot:
         words: list[int] = []
         at = first
         while at < head:
-            place = at % identity.capacity
-            n = min(LONGEST_READ // width, head - at, identity.capacity - place)
-            words += self._registers.words(fifo.address + place * width, n * width, "samples")
+            offset = at % identity.capacity
+            n = min(LONGEST_READ // width, head - at, identity.capacity - offset)
+            words += self._registers.words(fifo.address + offset * width, n * width, "samples")
             at += n
         counts, numbers = unpack_samples(np.array(words, dtype=np.uint16), identity.packing)
         wrong = np.flatnonzero(numbers != np.arange(first, head) % SEQUENCE[identity.packing])

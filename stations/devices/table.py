@@ -19,7 +19,7 @@ BEGIN_LOOKS = 3  # readings of the drive after which a move that has not started
 
 @dataclass(frozen=True)
 class DriveState:
-    """State of a drive; ``alarm`` is the text of its alarm, empty without one."""
+    """State of a drive; ``alarm`` is the text of its alarm, empty without an alarm."""
 
     ready: bool
     homed: bool
@@ -93,12 +93,12 @@ class TableAxis(ABC):
         return distance / limits.speed_deg_s + 2.0 * math.sqrt(distance / limits.acceleration_deg_s2)
 
     def turn(self, target: float, rate_deg_s: float) -> float:
-        """Starts a move to ``target`` degrees at a rate of its own, °/s, and returns its expected duration, s."""
-        kept, self._limits = self._limits, self._limits.model_copy(update={"speed_deg_s": rate_deg_s})
+        """Starts a move to ``target`` degrees at a given rate, °/s, and returns its expected duration, s."""
+        before, self._limits = self._limits, self._limits.model_copy(update={"speed_deg_s": rate_deg_s})
         try:
             return self.start(target)
         finally:
-            self._limits = kept
+            self._limits = before
 
     def _order_once(self, target: float) -> None:
         try:
@@ -128,7 +128,7 @@ class TableAxis(ABC):
         return self._registers.step("feedback_position")
 
     def _require_ready(self) -> None:
-        """Enables the drive; refuses one that is not ready, with the reason."""
+        """Enables the drive; refuses a drive that is not ready, with the reason."""
         self.prepare()
         state = self.state()
         self._refuse_alarm(state)
@@ -171,7 +171,7 @@ class TableAxis(ABC):
         return self._registers.number("feedback_position")
 
     def done(self) -> None:
-        """Ends the move: both axes are confirmed, so that the next command is a new one, also to the same target."""
+        """Ends the move: both axes are confirmed, so that the next command starts a new move, also to the same target."""
         self._pending = None
 
     def confirm(self, target: float) -> None:
@@ -226,7 +226,7 @@ class TiltTable:
     def turn(self, name: str, target: float, rate_deg_s: float) -> float:
         """Starts a turn of one axis from rest and returns its expected duration, s; the other axis stands."""
         self._rest()
-        self.axes[name].done()  # a turn to where the last one went is a turn of its own
+        self.axes[name].done()  # a turn to where the last turn went is a separate turn
         return self.axes[name].turn(target, rate_deg_s)
 
     def turned(self, name: str, target: float) -> bool:

@@ -74,7 +74,7 @@ class TcpLines:
         self._socket: socket.socket | None = None
 
     def exchange(self, line: str, what: str, before: Callable[[], None] | None = None) -> str:
-        """The answer to a line; a connection without a valid one is closed."""
+        """The answer to a line; a connection without a valid answer is closed."""
         try:
             return self._converse(line, before)
         except TimeoutError:

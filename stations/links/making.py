@@ -1,4 +1,4 @@
-"""The links of a station, made from its file: the only place that makes any, and behind each the gate for writes."""
+"""The links of a station, made from its file: they are made here alone, and behind each is the gate for writes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ Behind = dict[int, tuple[str, Profile]]  # name and profile of every device behi
 
 
 class WireSource(Protocol):
-    """Wires in place of those to devices, such as those of a replayed recording."""
+    """Wires instead of those to devices, such as those of a replayed recording."""
 
     def wire(self, link: str, where: str) -> Wire:
         """The Modbus wire of a link, which has the name of its first device; ``where`` is its address in messages."""
@@ -39,7 +39,7 @@ class Links:
     """Links by address, each made once; a simulated station's are ``simulated_at``, by what carries them.
 
     ``permit`` is what the gates ask before anything is sent; None where nothing is driven, or where no other process can drive.
-    ``recorder`` records every exchange; ``instead`` gives wires in place of those to devices.
+    ``recorder`` records every exchange; ``instead`` gives wires instead of those to devices.
     """
 
     config: StationConfig
@@ -50,13 +50,13 @@ class Links:
     recorder: FrameRecorder | None = field(default_factory=active_recorder)
     instead: WireSource | None = None
 
-    def registers(self, place: str) -> GatedLink:
-        """The link to the registers of the device at a place of the station, such as ``outer`` or ``slots``."""
-        device, profile = self._at(place)
+    def registers(self, name: str) -> GatedLink:
+        """The link to the registers of the device of this name in the station file, such as ``outer`` or ``slots``."""
+        device, profile = self._at(name)
         if device.link in TEXT_CARRIERS:
             raise RecipeInvalid(
-                f"devices.{place}.link: {device.link}, registers need tcp, rtu or tls; correct the station's file",
-                key=f"devices.{place}.link",
+                f"devices.{name}.link: {device.link}, registers need tcp, rtu or tls; correct the station's file",
+                key=f"devices.{name}.link",
             )
         key, settings = self._key(device), self.config.link
         if key not in self.made:
@@ -68,22 +68,22 @@ class Links:
             self.made[key] = _gated_link(wire, behind, self.recorder, settings.read_attempts, self.permit)
         made = self.made[key]
         if isinstance(made, GatedLines):
-            raise self._shared(place, profile)
+            raise self._shared(name, profile)
         return made
 
-    def lines(self, place: str) -> GatedLines:
-        """The line to the device at a place of the station."""
-        device, profile = self._at(place)
+    def lines(self, name: str) -> GatedLines:
+        """The line to the device of this name in the station file."""
+        device, profile = self._at(name)
         key, settings = self._key(device), self.config.link
         if key not in self.made:
             if self.instead is None:
                 wire = lines_to(device, *key[1:], settings.timeout_s)
             else:
-                wire = self.instead.lines(place, _where(key))
-            self.made[key] = _gated_lines(wire, place, profile, self.recorder, settings.read_attempts, self.permit)
+                wire = self.instead.lines(name, _where(key))
+            self.made[key] = _gated_lines(wire, name, profile, self.recorder, settings.read_attempts, self.permit)
         made = self.made[key]
         if isinstance(made, GatedLink):
-            raise self._shared(place, profile)
+            raise self._shared(name, profile)
         return made
 
     def close(self) -> None:
@@ -91,16 +91,16 @@ class Links:
         for link in self.made.values():
             link.close()
 
-    def _at(self, place: str) -> tuple[Device | Slots, Profile]:
-        """The device at a place, or the equipment in a role, and its profile, which must be carried as the file says."""
-        equipment = self.config.fitted().get(place)
-        device: Device | Slots = getattr(self.config.devices, place) if equipment is None else equipment
+    def _at(self, name: str) -> tuple[Device | Slots, Profile]:
+        """The device of a name, or the equipment in a role, and its profile, which must be carried as the file says."""
+        equipment = self.config.fitted().get(name)
+        device: Device | Slots = getattr(self.config.devices, name) if equipment is None else equipment
         profile = load_profile(device.profile)
         if device.link not in profile.links:
             raise RecipeInvalid(
-                f"devices.{place}.link: {device.link}, profile {profile.name} is carried by {' or '.join(profile.links)}; "
+                f"devices.{name}.link: {device.link}, profile {profile.name} is carried by {' or '.join(profile.links)}; "
                 "correct the station's file",
-                key=f"devices.{place}.link",
+                key=f"devices.{name}.link",
             )
         return device, profile
 
@@ -108,9 +108,9 @@ class Links:
         if self.config.kind == "simulated" and self.instead is not None:
             return (device.link, "", device.device_id if device.link in TEXT_CARRIERS else 0)
         if self.config.kind == "simulated":
-            own = self.lines_at.get(device.device_id)
-            if device.link in TEXT_CARRIERS and own is not None:
-                return (device.link, *own)
+            address = self.lines_at.get(device.device_id)
+            if device.link in TEXT_CARRIERS and address is not None:
+                return (device.link, *address)
             if device.link not in self.simulated_at:
                 carriers = " or ".join(self.simulated_at)
                 raise RecipeInvalid(
@@ -123,22 +123,24 @@ class Links:
         return ("rtu", device.serial, 0) if device.link == "rtu" else (device.link, device.host, device.port)
 
     def _behind(self, key: Key) -> Behind:
-        """The devices behind one address; the first one names the link."""
+        """The devices behind an address; the first of them names the link."""
         behind: Behind = {}
-        for place in Devices.model_fields:
-            device = getattr(self.config.devices, place)
+        for name in Devices.model_fields:
+            device = getattr(self.config.devices, name)
             if self._key(device) == key:
-                names = [f"slot {n}" for n in range(getattr(device, "count", 0))] or [place]
+                names = [f"slot {n}" for n in range(getattr(device, "count", 0))] or [name]
                 profile = load_profile(device.profile)
-                behind |= {device.device_id + n: (name, profile) for n, name in enumerate(names)}
+                behind |= {device.device_id + n: (label, profile) for n, label in enumerate(names)}
         for role, equipment in self.config.fitted().items():
             if equipment.link not in TEXT_CARRIERS and self._key(equipment) == key:
                 behind[equipment.device_id] = role, load_profile(equipment.profile)
         return behind
 
-    def _shared(self, place: str, profile: Profile) -> RecipeInvalid:
-        message = f"devices.{place}: profile {profile.name} at the address of a device that speaks otherwise; correct the file"
-        return RecipeInvalid(message, key=f"devices.{place}")
+    def _shared(self, name: str, profile: Profile) -> RecipeInvalid:
+        message = (
+            f"devices.{name}: profile {profile.name} at the address of a device that speaks otherwise; correct the file"
+        )
+        return RecipeInvalid(message, key=f"devices.{name}")
 
 
 def _where(key: Key) -> str:
@@ -150,23 +152,23 @@ def _where(key: Key) -> str:
 def _gated_link(
     wire: Wire, behind: Behind, recorder: FrameRecorder | None, attempts: int, permit: Permit | None
 ) -> GatedLink:
-    """The gate before a wire with these devices behind it; in a recording it has the name of the first one."""
+    """The gate before a wire with these devices behind it; in a recording it has the name of the first device."""
     if recorder is not None:
         name = next(iter(behind.values()))[0]
-        for device_id, (place, profile) in behind.items():
-            recorder.device(name, device_id, place, profile)
+        for device_id, (device, profile) in behind.items():
+            recorder.device(name, device_id, device, profile)
         wire = RecordedWire(wire, recorder, name)
     profiles = {device_id: profile for device_id, (_, profile) in behind.items()}
     return GatedLink(WireLink(wire, read_attempts=attempts), wire.where, profiles, permit)
 
 
 def _gated_lines(
-    wire: LineWire, place: str, profile: Profile, recorder: FrameRecorder | None, attempts: int, permit: Permit | None
+    wire: LineWire, name: str, profile: Profile, recorder: FrameRecorder | None, attempts: int, permit: Permit | None
 ) -> GatedLines:
     """The gate before the text connection of a device."""
     if recorder is not None:
-        recorder.device(place, 0, place, profile)
-        wire = RecordedLines(wire, recorder, place)
+        recorder.device(name, 0, name, profile)
+        wire = RecordedLines(wire, recorder, name)
     return GatedLines(LineLink(wire, read_attempts=attempts), wire.where, profile, permit)
 
 
@@ -206,14 +208,14 @@ class SingleLink:
     timeout_s: float
     permit: Permit | None = None
     recorder: FrameRecorder | None = field(default_factory=active_recorder)
-    place: str = "device"
+    name: str = "device"
     _made: GatedLink | GatedLines | None = None
 
     def registers(self) -> GatedLink:
         """The link to its registers, on a new connection."""
         self.close()
         wire = wire_to(self.device, self.device.host, self.device.port, self.timeout_s)
-        behind = {self.device.device_id: (self.place, self.profile)}
+        behind = {self.device.device_id: (self.name, self.profile)}
         self._made = made = _gated_link(wire, behind, self.recorder, 1, self.permit)
         return made
 
@@ -221,7 +223,7 @@ class SingleLink:
         """The connection for its lines, anew."""
         self.close()
         wire = lines_to(self.device, self.device.host, self.device.port, self.timeout_s)
-        self._made = made = _gated_lines(wire, self.place, self.profile, self.recorder, 1, self.permit)
+        self._made = made = _gated_lines(wire, self.name, self.profile, self.recorder, 1, self.permit)
         return made
 
     def close(self) -> None:

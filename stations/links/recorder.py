@@ -71,13 +71,13 @@ class FrameRecorder:
         made = datetime.now(UTC).isoformat(timespec="seconds")
         self._write({"format": FORMAT, "made": made, "purpose": self.purpose})
 
-    def device(self, link: str, device_id: int, place: str, profile: Profile) -> None:
+    def device(self, link: str, device_id: int, name: str, profile: Profile) -> None:
         """A device behind a link, before its first exchange."""
         if (link, device_id) in self._profiles:
             return
         self._profiles[link, device_id] = profile
         content = profile.model_dump(mode="json", exclude_defaults=True)
-        self._write({"device": place, "link": link, "id": device_id, "profile": content})
+        self._write({"device": name, "link": link, "id": device_id, "profile": content})
 
     def note(self, text: str) -> None:
         """A remark between the exchanges, such as a step of a bring-up or what a person has typed."""
@@ -148,7 +148,7 @@ class FrameRecorder:
 
 
 def meaning(request: bytes, registers: Sequence[Register]) -> str:
-    """What a Modbus request does, with the names of the registers that it touches, in the order of their addresses."""
+    """A Modbus request in words, with the names of the registers that it touches, in the order of their addresses."""
     function = request[0]
     if function not in SPACE_OF or len(request) < 5:
         return f"function {function}"
@@ -209,18 +209,18 @@ class RecordedLines(_Recorded[LineWire, str]):
 class RecordedClock:
     """A clock whose readings are recorded."""
 
-    own: Clock
+    wrapped: Clock
     recorder: FrameRecorder
 
     def now(self) -> float:
         """Seconds since the zero of the clock."""
-        reading = self.own.now()
+        reading = self.wrapped.now()
         self.recorder.clock(reading)
         return reading
 
     def sleep(self, seconds: float) -> None:
         """Returns ``seconds`` later."""
-        self.own.sleep(seconds)
+        self.wrapped.sleep(seconds)
 
 
 _active: list[FrameRecorder] = []

@@ -95,7 +95,7 @@ class SerialWire:
         port.reset_input_buffer()
 
     def _await_sign(self, port: Serial, device_id: int, request: bytes) -> None:
-        """Discards input until the sign of the device arrives; :class:`Silence` without one."""
+        """Discards input until the sign of the device arrives; :class:`Silence` without it."""
         tries = self._unsure[device_id]
         self._unsure[device_id] = tries + 1
         sign = echo_request(os.urandom(2)) if tries % 2 == 0 else read_of_other_size(request)

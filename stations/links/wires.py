@@ -51,7 +51,7 @@ class Wire(Protocol):
         ...
 
     def close(self) -> None:
-        """Ends the connection; the next request makes a new one."""
+        """Ends the connection; the next request connects again."""
 
 
 class LineWire(Protocol):
@@ -65,7 +65,7 @@ class LineWire(Protocol):
         ...
 
     def close(self) -> None:
-        """Ends the connection; the next line makes a new one."""
+        """Ends the connection; the next line connects again."""
 
 
 class TcpWire:

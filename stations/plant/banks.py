@@ -129,24 +129,24 @@ class LineDevice(Protocol):
 
 @dataclass
 class MemoryBank:
-    """Memory registers of the device in a slot, by the place of the slot."""
+    """Memory registers of the device in a slot, by the index of the slot."""
 
     world: World
-    place: int
+    index: int
 
     @property
     def unit(self) -> int:
         """The unit that is seated in the slot."""
-        return self.world.seats[self.place]
+        return self.world.seats[self.index]
 
     @property
     def flash(self) -> Flash:
-        """Its memory."""
+        """The flash memory of the unit in the slot."""
         return self.world.flash[self.unit]
 
     @property
     def teds(self) -> Eeprom:
-        """Its memory on the signal line."""
+        """The TEDS memory on the signal line of the unit in the slot."""
         return self.world.teds[self.unit]
 
     def sources(self) -> dict[str, Source]:

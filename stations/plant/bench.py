@@ -198,20 +198,20 @@ class Bench:
     def _answers(self, force: Array, share: Array, rest: Array, fine_hz: float, rate_hz: float) -> Array:
         """Outputs (n, units, 3) in g of forces (m, 3) in g at a fine rate, times ``share`` (units, 3), beside ``rest``."""
         n = len(force)
-        whole: int = cast("Any", next_fast_len)(n + round(0.05 * fine_hz), real=True)
-        f = np.asarray(np.fft.rfftfreq(whole, 1.0 / fine_hz), dtype=np.float64)
-        padded = np.zeros((whole, 3))
+        length: int = cast("Any", next_fast_len)(n + round(0.05 * fine_hz), real=True)
+        f = np.asarray(np.fft.rfftfreq(length, 1.0 / fine_hz), dtype=np.float64)
+        padded = np.zeros((length, 3))
         padded[:n] = force
         count = int(n / fine_hz * rate_hz * 0.985)
         outputs = np.zeros((count, len(self.units), 3))
         spectrum = np.fft.rfft(padded, axis=0)
         fine = np.arange(n) / fine_hz
         for k, (unit, truth) in enumerate(zip(self.units_now(), self.truths, strict=True)):
-            moved = np.fft.irfft(spectrum * unit.mass(f)[:, None] * share[k], whole, axis=0) + rest
+            moved = np.fft.irfft(spectrum * unit.mass(f)[:, None] * share[k], length, axis=0) + rest
             bent = self._bent(truth, unit, moved)
             floor = bent[-1]
             late = unit.behind(f) * np.exp(-2j * np.pi * f * unit.delay_s)
-            after = np.fft.irfft(np.fft.rfft(bent - floor, axis=0) * late[:, None], whole, axis=0)[:n] + floor
+            after = np.fft.irfft(np.fft.rfft(bent - floor, axis=0) * late[:, None], length, axis=0)[:n] + floor
             time = np.arange(count) / (rate_hz * (1.0 + unit.clock))
             outputs[:, k] = np.stack([np.interp(time, fine, after[:, i]) for i in range(3)], axis=1)
         return outputs
@@ -281,7 +281,7 @@ class Bench:
         return np.clip(counts, -preset.largest_count - 1, preset.largest_count) * preset.lsb
 
     def _as_reference(self, reference: Array, rng: np.random.Generator, conditions: frozenset[str]) -> Array:
-        """What the reference sensor reads of (n, 3) g: its error of calibration, noise, and a range that may clip."""
+        """Readings of the reference sensor of (n, 3) g: its error of calibration, noise, and a range that may clip."""
         felt = 0.0 * reference if "reference_cable_off" in conditions else reference
         read = felt * (1.0 + self.rig.reference_error) + 2e-4 * rng.standard_normal(reference.shape)
         if "clipped_reference" in conditions:

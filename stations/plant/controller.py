@@ -14,8 +14,8 @@ HUMIDITY_PCT = 40.0
 ABSOLUTE = 1  # type of a move
 
 
-def controller_bank(world: World, profile: Profile, own: Mapping[str, Source], command: Sink) -> Bank:
-    """A bank with the registers ``own`` and then the common registers of a chamber controller; ``command`` handles writes."""
+def controller_bank(world: World, profile: Profile, registers: Mapping[str, Source], command: Sink) -> Bank:
+    """A bank with the given registers and the common ones of a chamber controller; ``command`` handles writes."""
     chamber = world.fixture.chamber
     point = profile.register("set_point")
     sources: dict[str, Source] = {
@@ -29,7 +29,7 @@ def controller_bank(world: World, profile: Profile, own: Mapping[str, Source], c
         "ramp_rate": lambda: chamber.ramp_K_min,
         "humidity": lambda: HUMIDITY_PCT,
         "humidity_set_point": lambda: HUMIDITY_PCT,
-        **own,
+        **registers,
     }
     return Bank(profile, sources, command)
 

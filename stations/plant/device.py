@@ -25,7 +25,7 @@ QUADRATIC_PER_K = 0.003  # quadratic over linear temperature coefficient, one si
 
 @dataclass(frozen=True)
 class Truth:
-    """What a unit really is, in its own frame; ``slot_rotation`` is the fixture's part.
+    """True parameters of a unit, in its frame; ``slot_rotation`` is the fixture's part.
 
     Output in g = bias(θ) + scale(θ)·(misalignment·f + cubic·f³) + noise, θ = T − 25 °C; times ``output_scale`` it is in
     the output's unit.
@@ -61,7 +61,7 @@ def stream(*key: int | str) -> np.random.Generator:
 def draw_truth(
     preset: Preset, serial: str, seed: int, *, slot_rotation: Array, supply_ratio: float, output_scale: float
 ) -> Truth:
-    """A unit's truth, the same for the same serial and seed on every station."""
+    """A unit's truth, determined by serial and seed alone, whatever the station."""
     rng = stream(seed, serial, "truth")
     normal = rng.standard_normal((8, 3))
     skew = np.eye(3) + 1e-3 * preset.misalignment_sd_mrad * rng.standard_normal((3, 3)) * (1.0 - np.eye(3))
@@ -158,7 +158,7 @@ class PlantDevices:
             self._shift = SUPPLY_SHIFT_G * change
 
     def ripple_response(self, hertz: float) -> NDArray[np.complex128]:
-        """How much of a ripple at ``hertz`` Hz acts as a change of the supply does at rest, (s,), complex.
+        """Response to a ripple of the supply at ``hertz`` Hz over that to a slow change, (s,), complex.
 
         The regulator inside loses its gain above a corner; what passes it is filtered by the output stage.
         """
@@ -172,7 +172,7 @@ class PlantDevices:
         return np.asarray(share * turned.imag[..., None])
 
     def counts(self, output: Array, time: Array | None = None) -> Counts:
-        """What the converter says of outputs (n, s, 3) in g at instants (n,): supply, clipping at range and codes, rounding."""
+        """Codes of the converter for outputs (n, s, 3) in g at instants (n,): supply, clipping at range and codes, rounding."""
         preset = self._preset
         drift = 0.0 if time is None else np.asarray(self._supply_drift(time))[..., None]
         wave = self._ripple(time) if time is not None and self.ripple[0] > 0.0 else 0.0

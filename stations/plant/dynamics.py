@@ -64,7 +64,7 @@ class Dynamics:
 
 @dataclass(frozen=True)
 class DynamicTruth:
-    """What a unit really is in frequency: sprung mass, two-pole low-pass behind it, delay, clock, quadratic spring."""
+    """True dynamic parameters of a unit: sprung mass, two-pole low-pass behind it, delay, clock, quadratic spring."""
 
     natural_hz: float
     damping: float
@@ -87,7 +87,7 @@ class DynamicTruth:
 
 @dataclass(frozen=True)
 class Rig:
-    """What the equipment really is: its own errors, the same for all runs of a station."""
+    """True errors of the test equipment, which all runs of a station share."""
 
     reference_error: float
     distortion: float
@@ -109,8 +109,8 @@ def two_pole_behind(preset: Preset) -> float:
 
 def directions(axis: int, across_deg: float | None) -> tuple[Array, Array, Array]:
     """Unit vectors (3,) of the driven direction and of the two across it, in the axes of the units."""
-    own, one, two = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+    driven, first, second = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
     if across_deg is None:
-        return own, one, two
+        return driven, first, second
     c, s = math.cos(math.radians(across_deg)), math.sin(math.radians(across_deg))
-    return c * one + s * two, own, c * two - s * one
+    return c * first + s * second, driven, c * second - s * first

@@ -42,7 +42,7 @@ class Eeprom:
 
     @property
     def check(self) -> int:
-        """Inverted CRC-16 over command, address and row of the scratchpad; 0 without one."""
+        """Inverted CRC-16 over command, address and row of the scratchpad; 0 without a row."""
         if self.scratchpad is None:
             return 0
         address, row = self.scratchpad

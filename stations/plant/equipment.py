@@ -14,7 +14,10 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.plant.bench import Waveforms
 
 STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0  # of the exciter
-UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"  # answers to a line that is no command, and to one with a wrong value
+UNKNOWN, WRONG = (
+    "NA:CMD ERR",
+    "NA:PARA ERR",
+)  # answers to a line that is no command, and to a command with a wrong value
 DONE = "1"
 OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9
 TEXTS = {0: "No error", OUT_OF_RANGE: "Data out of range", UNDEFINED: "Undefined header"}
@@ -47,7 +50,7 @@ class ScpiDevice:
         return f'{code},"{TEXTS[code]}"', code != 0
 
     def ordered(self, value: str, low: float, high: float, before: float) -> float:
-        """The number of an order; the one before, with an error, for what is no number or outside its range."""
+        """The number of an order; the number before, with an error, for what is no number or outside its range."""
         try:
             number = float(value)
         except ValueError:
@@ -60,7 +63,7 @@ class ScpiDevice:
 
 
 class ResultFiles:
-    """Writes one file a recording; only the last is kept."""
+    """Writes each recording to a file; only the last file remains."""
 
     def __init__(self) -> None:
         self._folder: Path | None = None

@@ -97,7 +97,7 @@ PERIODS_S = (1500.0, 4100.0, 11000.0)  # air conditioning, doors, weather
 
 
 class Fixture:
-    """Slots, each with its thermal lag and its place in the air stream. Steps are computed one ahead of the clock.
+    """Slots, each with its thermal lag and its position in the air stream. Steps are computed one ahead of the clock.
 
     A command in the middle of a second acts from the next whole second on, so that the result does not depend on the division of
     the time before it into steps.
@@ -111,10 +111,10 @@ class Fixture:
         hidden: Sequence[HiddenEffect],
         moisture: "Moisture",
     ) -> None:
-        place = stream(sim.seed, "fixture")
+        seating = stream(sim.seed, "fixture")
         low, high = sim.slot_lag_s
-        lag = place.uniform(low, high, 64)[list(slots)]
-        self._gradient = sim.slot_gradient_K * place.standard_normal(64)[list(slots)]
+        lag = seating.uniform(low, high, 64)[list(slots)]
+        self._gradient = sim.slot_gradient_K * seating.standard_normal(64)[list(slots)]
         self._keep = np.exp(-STEP_S / lag)
         self._air_stream = air
         self._unrest = np.zeros(len(slots))

@@ -41,7 +41,7 @@ class Flash:
         """The present words of a copy."""
         self.settle(now_us)
         words = self._partly(now_us) if self._begun_us >= 0 and copy == self._copy else self.copies[copy]
-        return [word & ~self.stuck.get((copy, place), 0) & 0xFFFF for place, word in enumerate(words)]
+        return [word & ~self.stuck.get((copy, index), 0) & 0xFFFF for index, word in enumerate(words)]
 
     def power_off(self, now_us: int) -> None:
         """The supply fails: programming stops where it is; buffer and offsets are lost."""

@@ -76,8 +76,8 @@ class Journal:
         if not isinstance(event, Write):
             self._others.append((self._count, event))
             return
-        place = event.device_id, SPACES.index(event.space), event.address
-        self._writes.extend((event.at_us, *place, len(event.words), *event.words))
+        address = event.device_id, SPACES.index(event.space), event.address
+        self._writes.extend((event.at_us, *address, len(event.words), *event.words))
         self._count += 1
 
     def events(self, after: int = 0) -> Iterator[Event]:
@@ -93,8 +93,8 @@ class Journal:
                 words = self._writes[at + HEAD - 1]
                 if skipped >= after:
                     time, device_id, space, address, _ = self._writes[at : at + HEAD]
-                    own = self._writes[at + HEAD : at + HEAD + words]
-                    yield Write(time, device_id, address, tuple(own), SPACES[space])
+                    content = self._writes[at + HEAD : at + HEAD + words]
+                    yield Write(time, device_id, address, tuple(content), SPACES[space])
                 at += HEAD + words
                 skipped += 1
 
@@ -133,8 +133,8 @@ def _as_json(event: Event) -> dict[str, object]:
     if isinstance(event, LineOrder):
         return {"at_us": event.at_us, "device_id": event.device_id, "line": event.line}
     space = {} if event.space == "holding" else {"space": event.space}
-    place = {"at_us": event.at_us, "device_id": event.device_id, "address": event.address}
-    return {**place, "words": list(event.words), **space}
+    address = {"at_us": event.at_us, "device_id": event.device_id, "address": event.address}
+    return {**address, "words": list(event.words), **space}
 
 
 def _from_json(item: dict[str, Any]) -> Event:

@@ -49,8 +49,8 @@ class Plant(World):
             bank, code = self.banks[device_id], 0
             for fault in self._active(device_id):
                 held = [word for _, part in bank.read(address, len(words), space) for word in part]
-                whole = held if len(held) == len(words) else None
-                code = fault.on_write(words, whole, partial(bank.write, address, space=space))
+                present = held if len(held) == len(words) else None
+                code = fault.on_write(words, present, partial(bank.write, address, space=space))
                 break
             else:
                 bank.write(address, words, space)

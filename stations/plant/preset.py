@@ -120,15 +120,15 @@ def preset_names() -> list[str]:
 def load_preset(name: str, overrides: Mapping[str, float] | None = None) -> Preset:
     """The preset of that name (in any case), with some figures replaced; unknown names and keys are refused."""
     texts = {key.lower(): text for key, text in _texts().items()}
-    own = next((file for file in own_files("presets") if file.lower() == name.lower()), name)
-    path = own_file("presets", own, {own} if own.lower() in texts else ())
+    spelled = next((file for file in own_files("presets") if file.lower() == name.lower()), name)
+    path = own_file("presets", spelled, {spelled} if spelled.lower() in texts else ())
     if path is None and name.lower() not in texts:
         raise RecipeInvalid(f"device: no preset '{name}'; {did_you_mean(name, preset_names())}", key="device")
     source = f"preset {name}" if path is None else str(path)
     figures = parse_toml(texts[name.lower()] if path is None else read_text(path, "preset"), source)
-    if path is not None and str(figures.get("name", "")).lower() != own.lower():
+    if path is not None and str(figures.get("name", "")).lower() != spelled.lower():
         raise RecipeInvalid(
-            f"{path}: key 'name': '{figures.get('name', '')}', '{own}' as in the name of the file is needed; correct it",
+            f"{path}: key 'name': '{figures.get('name', '')}', '{spelled}' as in the name of the file is needed; correct it",
             key="name",
         )
     try:

@@ -109,8 +109,8 @@ def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], blo
         if not bits:
             registers[first - start : first - start + len(values)] = values
             continue
-        for place, value in enumerate(values, first):
-            word, bit = place // WORD - start, place % WORD
+        for position, value in enumerate(values, first):
+            word, bit = position // WORD - start, position % WORD
             if word < len(registers):
                 registers[word] = registers[word] & ~(1 << bit) | value << bit
 
@@ -118,7 +118,7 @@ def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], blo
 class _Handler(ServerRequestHandler):
     """A connection whose requests are tasks of the server's own loop.
 
-    pymodbus hands each one over as if it came from another thread, which wakes the loop three more times for a request.
+    pymodbus hands each request over as if it came from another thread, which wakes the loop three more times for a request.
     """
 
     def handle_later(self) -> None:

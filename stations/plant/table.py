@@ -71,7 +71,7 @@ class Move:
 
 
 class Axis:
-    """One axis: a servo with its encoder, and what may be wrong with it.
+    """An axis: a servo with its encoder, and its errors.
 
     ``zero_deg`` is by how much the encoder is off, ``play_deg`` how far the shaft may lag behind it, ``stuck_at`` what a stuck
     encoder says; ``homed`` is the drive's own belief. ``ripple`` are waves of the angle while it turns (orders a turn, degrees),
@@ -142,7 +142,7 @@ class Axis:
         return angle
 
     def turns(self, time: Array) -> bool:
-        """Whether it moves, or rings, at any of ``time`` (n,)."""
+        """Whether the axis moves, or rings, at any of ``time`` (n,)."""
         return bool(time[-1] > self.move.start and time[0] < self.move.end + IN_POSITION_S)
 
     def shaft(self, time: Array) -> Array:
@@ -167,7 +167,7 @@ class Axis:
         return round(angle / ENCODER_STEP_DEG) * ENCODER_STEP_DEG
 
     def _age(self, now: float) -> float:
-        """Age of a reading, s; one that stands still shows the same at any age."""
+        """Age of a reading, s; the reading of a still axis does not depend on it."""
         latency, jitter = self.late_s
         if jitter == 0.0:
             return latency

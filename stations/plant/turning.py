@@ -18,7 +18,7 @@ NEAR_S = 2e-3  # of the positions before and after, whose second difference is t
 
 
 def places(turning: Turning, slots: Sequence[int]) -> Array:
-    """Where the proof masses are in the fixture, (s, 3), m from the crossing of the axes: slots on a circle."""
+    """Positions of the proof masses in the fixture, (s, 3), m from the crossing of the axes: slots on a circle."""
     around = 2.0 * math.pi * np.asarray(slots, dtype=np.float64) / SLOTS_ON_CIRCLE
     radius = 1e-3 * turning.radius_mm
     height = np.full_like(around, HEIGHT_M if radius > 0.0 else 0.0)
@@ -37,7 +37,7 @@ class TurningForce:
             axis.late_s = (1e-3 * turning.latency_ms, 1e-3 * turning.jitter_ms)
 
     def force(self, time: Array, up: Array) -> Array | float:
-        """In the fixture, (n, s, 3) in g, at instants (n,) s; ``up`` (3,) in g. Zero while both axes stand."""
+        """Specific force by turning, in the fixture, (n, s, 3), g, at instants (n,), s; ``up`` (3,), g; 0 at rest."""
         if not (self.outer.turns(time) or self.inner.turns(time)):
             return 0.0
         before, at, after = (self._where(time + step) for step in (-NEAR_S, 0.0, NEAR_S))
@@ -59,10 +59,10 @@ class TurningForce:
         """Change (n, 3) of the vertical, g in the laboratory, by the lean of the turning axis, which goes round twice."""
         outer, inner = self._angles(time)
         zero = np.zeros_like(time)
-        own = self._wobble * self.outer.move.share(time)
-        lean = np.stack([zero, own * np.cos(2.0 * outer), own * np.sin(2.0 * outer)], axis=-1)
-        own = self._wobble * self.inner.move.share(time)
-        a, b = own * np.cos(2.0 * inner), own * np.sin(2.0 * inner)
+        size = self._wobble * self.outer.move.share(time)
+        lean = np.stack([zero, size * np.cos(2.0 * outer), size * np.sin(2.0 * outer)], axis=-1)
+        size = self._wobble * self.inner.move.share(time)
+        a, b = size * np.cos(2.0 * inner), size * np.sin(2.0 * inner)
         lean += np.stack([a, np.cos(outer) * b, np.sin(outer) * b], axis=-1)
         return np.cross(lean, up)
 

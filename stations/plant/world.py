@@ -66,14 +66,14 @@ class World:
         self.preset: Preset = load_preset(lot.device, sim.preset_overrides).with_axes(lot.sensor_axes)
         self.serials = [unit.serial for unit in lot.units]
         self.slots = [unit.slot for unit in lot.units]
-        self.seats = list(range(len(lot.units)))  # index of the unit that really sits in the place of each unit
+        self.seats = list(range(len(lot.units)))  # index of the unit that really sits in each unit's slot
         self._key = int(stream(sim.seed, lot.seed, lot.repeat).integers(2**62))
         self.outer, self.inner = Axis(self._key, OUTER), Axis(self._key, INNER)
         effects = [*hidden, *(hidden_effect(h.kind, h.figures) for h in sim.hidden)]
         for number, effect in enumerate(effects):
             effect.begin(len(self.slots), stream(lot.seed, "hidden", number))
-        own = sim.reference_errors
-        self.station_errors = None if own is None else StationErrors(own, stream(sim.seed, "references"))
+        errors = sim.reference_errors
+        self.station_errors = None if errors is None else StationErrors(errors, stream(sim.seed, "references"))
         if self.station_errors is not None:
             effects.append(self.station_errors)
             self.outer.scatter_deg = self.inner.scatter_deg = self.station_errors.pose_deg
@@ -120,9 +120,11 @@ class World:
 
     def _draw_truths(self, sim: Simulation, lot: Lot) -> list[Truth]:
         seats = 1e-3 * sim.slot_rotation_mrad * stream(sim.seed, "slots").standard_normal((64, 3))
-        own = partial(draw_truth, self.preset, seed=lot.seed, output_scale=self.preset.scale)
+        truth_of = partial(draw_truth, self.preset, seed=lot.seed, output_scale=self.preset.scale)
         units = zip(lot.units, self._supplies.offset.tolist(), strict=True)
-        return [own(unit.serial, slot_rotation=rotation(seats[unit.slot]), supply_ratio=ratio) for unit, ratio in units]
+        return [
+            truth_of(unit.serial, slot_rotation=rotation(seats[unit.slot]), supply_ratio=ratio) for unit, ratio in units
+        ]
 
     @property
     def now(self) -> float:
@@ -247,12 +249,12 @@ class Supplies:
     """
 
     def __init__(self, sim: Simulation, slots: Sequence[int], run: np.random.Generator, *, followed: bool) -> None:
-        own = list(slots)
-        self.offset = 1.0 + sim.supply_spread * stream(sim.seed, "supply").standard_normal(64)[own]
-        self.factor = np.ones(len(own))
+        numbers = list(slots)
+        self.offset = 1.0 + sim.supply_spread * stream(sim.seed, "supply").standard_normal(64)[numbers]
+        self.factor = np.ones(len(numbers))
         self._meter = 1.0 + 1e-6 * sim.supply_reading_ppm * float(stream(sim.seed, "supply meter").standard_normal())
         self._amplitude = sim.supply_drift * math.sqrt(2.0 / WAVES) if followed else 0.0
-        self._phase = run.uniform(0.0, 2.0 * math.pi, (64, WAVES))[own]
+        self._phase = run.uniform(0.0, 2.0 * math.pi, (64, WAVES))[numbers]
         self._rate = 2.0 * math.pi / np.geomspace(SLOWEST_S, FASTEST_S, WAVES)
 
     def drift(self, time: Array) -> Array | float:

@@ -28,13 +28,13 @@ def what_a_client_gets(path: Path) -> list[str]:
     lines: dict[str, LineWire] = {}
     with ReplayServer(recording, speed=FAST) as server:
         try:
-            return [_one(recording, exchange, server, wires, lines) for exchange in recording.exchanges]
+            return [_seen(recording, exchange, server, wires, lines) for exchange in recording.exchanges]
         finally:
             for wire in (*wires.values(), *lines.values()):
                 wire.close()
 
 
-def _one(
+def _seen(
     recording: FrameFile, exchange: Exchange, server: ReplayServer, wires: dict[str, Wire], lines: dict[str, LineWire]
 ) -> str:
     patience = SILENT_S if exchange.failed == SILENCE else PATIENCE_S
@@ -56,4 +56,4 @@ def _one(
     except (Broken, Malformed) as problem:
         failed = f"{type(problem).__name__.lower()}"
     got = replace(exchange, seconds=0.0, reply=reply, failed=failed)
-    return f"{recording.place_of(exchange)}: {exchange.what} -> {said(got, recording.device_of(exchange))}"
+    return f"{recording.name_of(exchange)}: {exchange.what} -> {said(got, recording.device_of(exchange))}"

@@ -27,7 +27,7 @@ class RecordedDevice:
 
     link: str
     device_id: int
-    place: str
+    name: str
     profile: Profile | None = None
 
 
@@ -52,12 +52,12 @@ class Exchange:
 
     @property
     def writes(self) -> bool:
-        """Whether it is an order; a line of text is one where it is no query."""
+        """Whether the exchange is an order; a line of text is an order unless it is a query."""
         return not self.request.endswith(b"?") if self.text else self.request[:1] != b"" and self.request[0] in WRITES
 
     @property
     def key(self) -> tuple[str, int, bytes]:
-        """What is asked of whom."""
+        """Link, device and request, by which a replay finds the answer."""
         return self.link, self.device_id, self.request
 
 
@@ -97,15 +97,15 @@ class FrameFile:
 
     def device_of(self, exchange: Exchange) -> RecordedDevice | None:
         """The device of an exchange, where the recording names it."""
-        own = [
+        matching = [
             d for d in self.devices if d.link == exchange.link and (exchange.text or d.device_id == exchange.device_id)
         ]
-        return own[0] if own else None
+        return matching[0] if matching else None
 
-    def place_of(self, exchange: Exchange) -> str:
+    def name_of(self, exchange: Exchange) -> str:
         """The name of the device of an exchange."""
         device = self.device_of(exchange)
-        return f"device {exchange.device_id}" if device is None else device.place
+        return f"device {exchange.device_id}" if device is None else device.name
 
 
 @contextmanager
@@ -126,11 +126,11 @@ def read_frames(path: Path) -> FrameFile:
     """
     with readable(path):
         lines = path.read_bytes().split(b"\n")
-    whole, torn = lines[:-1], lines[-1]
+    complete, torn = lines[:-1], lines[-1]
     content = FrameFile(
         path.name, remark=f"the last line is incomplete ({len(torn)} bytes) and left out" if torn else ""
     )
-    for number, entry in _entries(path, whole):
+    for number, entry in _entries(path, complete):
         if number == 1:
             if entry.get("format") != FORMAT:
                 raise DataRejected(
@@ -142,7 +142,7 @@ def read_frames(path: Path) -> FrameFile:
             f"recording: {path.name}, line {number}", "a line of the recorder is needed; give another recording"
         ):
             _add(content, entry)
-    if not whole:
+    if not complete:
         raise DataRejected(f"recording: {path} has no line, a recording is needed; give another file")
     return content
 

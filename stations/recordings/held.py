@@ -20,7 +20,7 @@ MALFORMED = "malformed: "
 
 @dataclass
 class Held:
-    """What is left of a recording."""
+    """The part of a recording that is not replayed yet."""
 
     recording: FrameFile
     _left: deque[Item] = field(default_factory=deque["Item"])
@@ -69,8 +69,8 @@ class Held:
     def _departed(self, found: str, item: Item | None) -> DataRejected:
         """Not an error of a station: what repeats or pauses after those must not do so after this one."""
         if isinstance(item, Exchange):
-            place = self.recording.place_of(item)
-            needed = f"{item.what} of {place} at {item.at_s:.3f} s ({item.request.hex(' ')})"
+            device = self.recording.name_of(item)
+            needed = f"{item.what} of {device} at {item.at_s:.3f} s ({item.request.hex(' ')})"
         else:
             needed = "a reading of the clock" if item is not None else "nothing more"
         return DataRejected(

@@ -55,7 +55,7 @@ def read_recording(path: Path) -> FrameFile:
 
 @dataclass
 class _Stream:
-    """One direction of a TCP connection: its bytes in order, without repeated ones."""
+    """One direction of a TCP connection: its bytes in order, without repeated bytes."""
 
     first: int | None = None
     next: int = 0
@@ -63,7 +63,7 @@ class _Stream:
     early: dict[int, bytes] = field(default_factory=dict[int, bytes])
 
     def add(self, number: int, data: bytes) -> None:
-        """A segment; one that comes early waits for those before it, but not for ever: a capture may have lost them."""
+        """Adds a segment; an early segment waits for those before it, but not for ever: a capture may have lost them."""
         self.first = number if self.first is None else self.first
         at = (number - self.first) % 2**32
         if at > 2**31:  # repeated from before the capture
@@ -99,7 +99,7 @@ class _Pending:
     data: bytes
 
     def exchange(self, zero: float, when: float, reply: bytes | None) -> Exchange:
-        """With its answer at a time, or without one; ``zero`` is the beginning of the recording, s."""
+        """With its answer at a time, or without an answer; ``zero`` is the beginning of the recording, s."""
         failed = "" if reply is not None else SILENCE
         at, seconds, what = self.at - zero, when - self.at, meaning(self.data, ())
         return Exchange(at, seconds, self.link, self.device_id, what, self.data, reply, failed)
@@ -138,7 +138,7 @@ def _of_packets(path: Path) -> Iterator[Exchange]:
                     address = ".".join(map(str, target[0])) if len(target[0]) == 4 else target[0].hex()
                     pending = _Pending(when, f"{address}:{target[1]}", frame[6], frame[HEADER:])
                     waiting[source, target, frame[:2], frame[6]] = pending
-    found += [one.exchange(zero or 0.0, one.at, None) for one in waiting.values()]
+    found += [pending.exchange(zero or 0.0, pending.at, None) for pending in waiting.values()]
     yield from sorted(found, key=lambda exchange: exchange.at_s)
 
 
@@ -170,7 +170,7 @@ def _segment(dpkt: Any, link_type: int, raw: bytes) -> tuple[tuple[bytes, int], 
 
 
 def _of_log(path: Path) -> Iterator[Exchange]:
-    """The exchanges in a log with one frame a line, each a request or an answer, of RTU or TCP."""
+    """The exchanges in a log whose lines are frames of RTU or TCP, each a request or an answer."""
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
     zero, last = None, 0.0
     pending: _Pending | None = None

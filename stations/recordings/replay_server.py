@@ -1,7 +1,7 @@
-"""What a recorded device answers, and a server for it: to the same requests the same answers, in their order.
+"""What a recorded device answers, and a server for it: equal requests get equal answers, in their order.
 
 A device is followed through its recording by the orders that it gets. Between two orders a client may read more or less often
-than the recorded one did: a read gets the next recorded answer before the next order, and after the last one that answer again.
+than the recorded one did: a read gets the next recorded answer before the next order, and after the last again that.
 What was never asked while it was recorded has no answer, and is listed.
 """
 
@@ -28,7 +28,7 @@ Who = tuple[str, int]
 
 @dataclass
 class _Followed:
-    """Where a device is in its recording."""
+    """The position of a device in its recording."""
 
     orders: list[int] = field(default_factory=list[int])
     by_request: dict[bytes, list[int]] = field(default_factory=lambda: defaultdict(list))

@@ -50,11 +50,11 @@ def address_of(device: Device | Slots) -> str:
 
 
 def _line(path: str) -> str:
-    """The kernel's name of a serial line, the same for all links and device nodes."""
+    """The kernel's name of a serial line, which all links and device nodes share."""
     real_path = os.path.realpath(path)
     try:
         node = os.stat(real_path)  # noqa: PTH116 - of a text, as the station's file has it
-    except OSError:  # unplugged now; its name stays the same
+    except OSError:  # unplugged now; its name does not change
         return real_path
     if not stat.S_ISCHR(node.st_mode):
         return real_path
@@ -69,7 +69,8 @@ def _host(name: str) -> str:
     except OSError:  # a name that cannot be resolved now stays the same name
         return name.lower()
     numbers = sorted(
-        (ipaddress.ip_address(address.partition("%")[0]) for address in addresses), key=lambda one: (one.version, one)
+        (ipaddress.ip_address(address.partition("%")[0]) for address in addresses),
+        key=lambda number: (number.version, number),
     )
     if any(number.is_loopback or _is_own(str(number)) for number in numbers):
         return HERE
@@ -92,7 +93,7 @@ Role = Literal["run", "watchdog"]
 
 @dataclass(frozen=True)
 class Holder:
-    """Holder of a lease; ``token`` is the same for all leases of one run.
+    """Holder of a lease; ``token`` is shared by all leases of a run.
 
     ``tripped``: the run did not respond and its watchdog has made the station safe. ``trouble``: what failed so far.
     """

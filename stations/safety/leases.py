@@ -197,8 +197,8 @@ class Leases:
             named = self._file(part).with_suffix(".lock").stat()
         except OSError:
             return False
-        own = os.fstat(lock.fileno())
-        return (named.st_dev, named.st_ino) == (own.st_dev, own.st_ino)
+        locked = os.fstat(lock.fileno())
+        return (named.st_dev, named.st_ino) == (locked.st_dev, locked.st_ino)
 
     def _keep(self, part: Part) -> None:
         """Restores a lease whose file was removed, where no other process has taken it since; else the leases are lost."""

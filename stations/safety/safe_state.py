@@ -36,7 +36,7 @@ class Reached:
         return not self.failed
 
     def sentence(self) -> str:
-        """Both in one sentence."""
+        """Completed and failed commands in a sentence."""
         failed = [f"{what} not done ({why})" for what, why in self.failed.items()]
         return "; ".join([*self.done, *failed])
 
@@ -59,7 +59,7 @@ def safe_steps(
 
 def equipment_steps(equipment: Mapping[str, Any]) -> list[SafeStep]:
     """The commands that stop test equipment: an exciter or centrifuge before anything else."""
-    return [SafeStep(role, f"{role.replace('_', ' ')} stopped", one.make_safe) for role, one in equipment.items()]
+    return [SafeStep(role, f"{role.replace('_', ' ')} stopped", device.make_safe) for role, device in equipment.items()]
 
 
 def reach_safe_state(steps: list[SafeStep], *, patience_s: float = 0.0) -> Reached:

@@ -82,10 +82,10 @@ class Watched:
         if abs(air - target) > band:
             text = f"the chamber's air is at {air:.2f} °C, {target:g} ± {band:g} °C is needed"
             reasons.append(Reason("chamber", text))
-        celsius, own = instruments.temperature_C, self.soak.band_K
-        left = tuple(s for s in slots if math.isfinite(celsius[s]) and abs(celsius[s] - target) > own)
+        celsius, soak_band = instruments.temperature_C, self.soak.band_K
+        left = tuple(s for s in slots if math.isfinite(celsius[s]) and abs(celsius[s] - target) > soak_band)
         if left:
-            text = f"slot {left[0]}: device at {celsius[left[0]]:.2f} °C, {target:g} ± {own:g} °C is needed"
+            text = f"slot {left[0]}: device at {celsius[left[0]]:.2f} °C, {target:g} ± {soak_band:g} °C is needed"
             reasons.append(Reason("device", text, left))
         return reasons
 

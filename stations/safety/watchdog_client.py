@@ -71,7 +71,7 @@ class Watchdog:
             raise StationTimeout(self.trouble or f"watchdog: not ready after {STARTS * START_S:g} s")
 
     def beat(self) -> None:
-        """Sends the heartbeat and checks the watchdog; one that has ended or does not answer is replaced."""
+        """Sends the heartbeat and checks the watchdog; a watchdog that has ended or does not answer is replaced."""
         if self.trouble or self._process is None:
             return
         self._listen()

@@ -315,7 +315,7 @@ def test_a_station_check_is_recorded_with_every_device_and_drawn(tmp_path):
     done = command(["station", "check", "--read-only", "--record", str(path), "--slots", "2"])
     assert done.returncode == 0, done.stderr
     recording = read_frames(path)
-    assert {d.place for d in recording.devices} >= {"outer", "inner", "chamber", "reader", "slot 0", "slot 1"}
+    assert {d.name for d in recording.devices} >= {"outer", "inner", "chamber", "reader", "slot 0", "slot 1"}
     chart = timeline(recording)
     assert set(chart.plots[0].y.names) >= {"outer", "chamber", "reader"}
     assert recording_module.active_recorder() is None

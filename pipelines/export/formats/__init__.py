@@ -1,4 +1,4 @@
-"""The export formats: each is one module of this package with a NAME and a ``write``, and is found here by itself."""
+"""The export formats: each module of this package with a NAME and a ``write`` is a format, and is discovered here."""
 
 from __future__ import annotations
 

@@ -43,8 +43,8 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     if fixed and behind:
         raise WrongUse("export: --filter and track need --set arithmetic=double or float; choose one of them")
     exact = np.float32 if kind == "float" else np.float64
-    own = settings.firmware.names(_literal(exact), _braces)
-    tail = tail.replace("#endif", _filled(_template("filter"), own) + "#endif") if own else tail
+    of_filter = settings.firmware.names(_literal(exact), _braces)
+    tail = tail.replace("#endif", _filled(_template("filter"), of_filter) + "#endif") if of_filter else tail
     models = settings.firmware.models({unit.unit: _symbol(unit) for unit in units}, _literal(exact), _braces)
     tail = tail.replace("#endif", _filled(_template("bias"), models) + "#endif") if models else tail
     names |= {"LOW": "low_mC", "HIGH": "high_mC"} if fixed else {"LOW": "low_C", "HIGH": "high_C"}
@@ -63,8 +63,8 @@ def _filled(text: str, names: dict[str, str]) -> str:
 
 def _real_unit(unit: UnitCalibration, kind: str) -> str:
     exact = np.float32 if kind == "float" else np.float64
-    whole = unit.with_every_axis
-    bias, response = whole.bias.astype(exact), whole.response.astype(exact)
+    full = unit.with_every_axis
+    bias, response = full.bias.astype(exact), full.response.astype(exact)
     limits = np.array(unit.temperatures, dtype=exact)
     literal = _literal(exact)
     crc = checksum(unit.unit, _PACKED[kind], [*limits, *bias.ravel(), *response.ravel()])
@@ -96,22 +96,23 @@ def _literal(exact: type[np.float32 | np.float64]) -> Callable[[Any], str]:
 
 
 def _fixed_unit(unit: UnitCalibration) -> str:
-    own, whole = fixed_point(unit), unit.with_every_axis
-    errors = f"at 1 g: {largest_error_ug(whole, own.correct):.3g} ug"
+    fixed, full_unit = fixed_point(unit), unit.with_every_axis
+    errors = f"at 1 g: {largest_error_ug(full_unit, fixed.correct):.3g} ug"
     if unit.full_scale is not None:
-        full = unit.full_scale / own.scale
-        errors += f", at full scale ({full:.3g} g): {largest_error_ug(whole, own.correct, full):.3g} ug"
-    factor = round(2.0**_COUNTS_BITS / own.scale) if unit.out_unit == "LSB" else 0
-    low, high = own.range_mC
-    crc = checksum(unit.unit, "i", [low, high, *own.bias.ravel(), *own.inverse.ravel()])
-    plain = f"output[] = value in {unit.out_unit} / {own.scale!r} * {ONE}, rounded"
+        full = unit.full_scale / fixed.scale
+        errors += f", at full scale ({full:.3g} g): {largest_error_ug(full_unit, fixed.correct, full):.3g} ug"
+    factor = round(2.0**_COUNTS_BITS / fixed.scale) if unit.out_unit == "LSB" else 0
+    low, high = fixed.range_mC
+    crc = checksum(unit.unit, "i", [low, high, *fixed.bias.ravel(), *fixed.inverse.ravel()])
+    plain = f"output[] = value in {unit.out_unit} / {fixed.scale!r} * {ONE}, rounded"
     counts = f"{factor} counts factor" if factor else plain
     return (
         f"/* {comment(unit.unit)}: {comment(unit.certified)}\n"
         f" * largest error against the full calibration from {low / 1000:g} to {high / 1000:g} degrees Celsius, {errors};\n"
         f" * beyond these temperatures the coefficients of the nearest one hold; {counts}{_of_fewer_axes(unit, f' * {ONE}')} */\n"
         f"static const tumbleline_calibration tumbleline_{_symbol(unit)} = {{\n"
-        f'    "{unit.unit}", {low}, {high}, INT64_C({factor}),\n    {_braces(own.bias, str)},\n    {_braces(own.inverse, str)},\n'
+        f'    "{unit.unit}", {low}, {high}, INT64_C({factor}),\n'
+        f"    {_braces(fixed.bias, str)},\n    {_braces(fixed.inverse, str)},\n"
         f"    0x{crc:08X}u\n}};\n"
     )
 

@@ -42,9 +42,9 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     lines = noise_heading(unit, run, noise, [_without_calibration(unit)], remarks)
     for symbol, key, text in _KEYS:
         values = factor * noise.value[symbol]
-        own = ", ".join(f"{axis} {value:.4g}" for axis, value in zip(AXES, values, strict=True))
+        by_axis = ", ".join(f"{axis} {value:.4g}" for axis, value in zip(AXES, values, strict=True))
         remark = noise.remark(symbol)
-        lines += [f"# {symbol} by axis, {text}: {own}" + (f"; {remark}" if remark else "")]
+        lines += [f"# {symbol} by axis, {text}: {by_axis}" + (f"; {remark}" if remark else "")]
         lines += [f"{key}: {float(np.max(values)):.6e}"]
     return "\n".join([*lines, f"update_rate: {rate:g}"]) + "\n"
 

@@ -61,14 +61,14 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
 def _properties(unit: UnitCalibration, settings: ExportSettings) -> dict[str, Any]:
     """The properties of accelparams in m/s², %, °C."""
     nominal, g = _nominal(unit, settings), STANDARD_GRAVITY_M_S2
-    own = np.diag(unit.response[0])
+    scales = np.diag(unit.response[0])
     noise = {} if unit.noise is None else {s: g / MICRO * unit.noise.value[s][None, :] for s in ("N", "B", "K")}
-    skew = _PERCENT * unit.response[0] / own[:, None]
+    skew = _PERCENT * unit.response[0] / scales[:, None]
     content: dict[str, Any] = {
         "ConstantBias": (g * unit.bias[0] / nominal)[None, :],
         "AxesMisalignment": skew,
         "TemperatureBias": (g * _temperature_bias(unit) / nominal)[None, :],
-        "TemperatureScaleFactor": (_PERCENT * np.diag(unit.response[1]) / own)[None, :],
+        "TemperatureScaleFactor": (_PERCENT * np.diag(unit.response[1]) / scales)[None, :],
     }
     if unit.full_scale is not None:
         content["MeasurementRange"] = g * unit.full_scale / nominal

@@ -48,13 +48,13 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
 
 def _fitted(c: UnitCalibration, letter: str) -> AxisPolynomial:
     """The polynomial of one axis, of the degree that its levels of force determine, up to the third."""
-    own = c.dwells[np.isfinite(c.dwells[f"out_{letter}"].to_numpy(dtype=float))]
-    if not set(FORCE_COLUMNS) <= set(own):
+    rows = c.dwells[np.isfinite(c.dwells[f"out_{letter}"].to_numpy(dtype=float))]
+    if not set(FORCE_COLUMNS) <= set(rows):
         raise WrongUse(
             f"export: unit {c.unit} has no known forces, a polynomial needs them; import with poses, or use --format json"
         )
-    output, force = (own[f"{name}_{letter}"].to_numpy(dtype=float)[:, None] for name in ("out", "force"))
-    temperature = own["unit_C"].to_numpy(dtype=float) if "unit_C" in own else np.full(len(own), np.nan)
+    output, force = (rows[f"{name}_{letter}"].to_numpy(dtype=float)[:, None] for name in ("out", "force"))
+    temperature = rows["unit_C"].to_numpy(dtype=float) if "unit_C" in rows else np.full(len(rows), np.nan)
     varied = bool(np.isfinite(temperature).all()) and float(np.ptp(temperature)) > SPAN_K
     degree = min(DEGREE, levels_apart(force[:, 0], APART_G) - 1)
     try:

@@ -42,7 +42,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     Raises
     ------
     WrongUse
-        The output is not in V, the data sheet is missing, or a serial number has no digits of its own at its end.
+        The output is not in V, the data sheet is missing, or a serial number does not end in digits that no other unit has.
     """
     sheet = settings.data_sheet or data_sheet("", "")  # which refuses, as no key is given
     files: dict[str, bytes] = {}
@@ -50,14 +50,14 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     for unit in units:
         serial = serials[unit.unit]
         refuse_digital(unit.unit, unit.out_unit)
-        own = with_period(unit.unit, unit.certificate, sheet)
+        dated = with_period(unit.unit, unit.certificate, sheet)
         stated = {
             letter: Accelerometer(axis, float(unit.response[0, row, axis]) / STANDARD_GRAVITY_M_S2)
             for row, (axis, letter) in enumerate(zip(unit.axes, unit.letters, strict=True))
         }
-        files |= {f"{unit.unit}-{letter}.teds": page(own, serial, one) for letter, one in stated.items()}
+        files |= {f"{unit.unit}-{letter}.teds": page(dated, serial, sensor) for letter, sensor in stated.items()}
         text = [
-            *heading(unit.unit, unit.certified, run, own, serial),
+            *heading(unit.unit, unit.certified, run, dated, serial),
             AT_REST,
             *axis_lines(stated),
             *_left_out(unit, stated),
@@ -67,7 +67,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
 
 
 def serial_numbers(units: Sequence[str]) -> dict[str, int]:
-    """The digits at the end of each serial number, by unit; two units with the same are refused."""
+    """The digits at the end of each serial number, by unit; two units with equal digits are refused."""
     owners: dict[int, str] = {}
     for unit in units:
         serial = _serial(unit)
@@ -112,7 +112,7 @@ def with_period(unit: str, certificate: Calibration | None, sheet: DataSheet) ->
 
 
 def heading(unit: str, certified: str, run: str, sheet: DataSheet, serial: int) -> list[str]:
-    """What the page states beside the calibration, for people."""
+    """Lines of text on what the page states beside the calibration."""
     return [
         f"accelerometer {unit}, run {run}: IEEE 1451.4 basic TEDS and template 25, {PAGE_BYTES} bytes for each axis",
         certified,
@@ -129,9 +129,9 @@ AT_REST = f"reference 25 °C and {REFERENCE.start:g} Hz, high-pass {HIGH_PASS.st
 def axis_lines(stated: dict[str, Accelerometer]) -> list[str]:
     """The sensitivities as stated beside those that were measured."""
     lines: list[str] = []
-    for letter, one in stated.items():
-        polarity = "negative" if one.sensitivity < 0.0 else "positive"
-        measured = abs(one.sensitivity)
+    for letter, sensor in stated.items():
+        polarity = "negative" if sensor.sensitivity < 0.0 else "positive"
+        measured = abs(sensor.sensitivity)
         value = SENSITIVITY.stated(measured)
         lines.append(
             f"axis {letter}: {value:.6g} V/(m/s²), {polarity}; measured {measured:.6g}, "
@@ -141,13 +141,15 @@ def axis_lines(stated: dict[str, Accelerometer]) -> list[str]:
 
 
 def _left_out(unit: UnitCalibration, stated: dict[str, Accelerometer]) -> list[str]:
-    """What a reader's V / sensitivity leaves of the calibration, µg; the axes without an output are known."""
-    whole = unit.with_every_axis
+    """Error of a reader that divides V by the sensitivity, against the calibration, µg; the axes without an output are known."""
+    full = unit.with_every_axis
     scale = np.ones(3)
-    for one in stated.values():
-        scale[one.axis] = STANDARD_GRAVITY_M_S2 * np.copysign(SENSITIVITY.stated(abs(one.sensitivity)), one.sensitivity)
+    for sensor in stated.values():
+        scale[sensor.axis] = STANDARD_GRAVITY_M_S2 * np.copysign(
+            SENSITIVITY.stated(abs(sensor.sensitivity)), sensor.sensitivity
+        )
 
     def applied(output: Array, temperature: float) -> Array:
         return output / scale
 
-    return comment_lines(whole, applied, (BIAS, BIAS_T, SCALE_T, ACROSS, ACROSS_T))
+    return comment_lines(full, applied, (BIAS, BIAS_T, SCALE_T, ACROSS, ACROSS_T))

@@ -1,4 +1,4 @@
-"""The readers of files: each is one module of this package and is discovered here.
+"""The readers of files: each module of this package is a reader, and is discovered here.
 
 A module states ``NAME`` (of the format in the archive), ``TITLE`` (for people), ``EXTRA`` (the optional dependency that
 it needs, or empty), ``ORDER`` (order in which readers are tried), ``recognised`` and ``read``.
@@ -59,13 +59,13 @@ def find_readers(package: str, path: Iterable[str]) -> dict[str, FileReader]:
         if lacking:
             missing.append(f"{info.name}: no {', '.join(lacking)}")
             continue
-        one = cast("FileReader", module)
-        if any(one.NAME == other.NAME or one.ORDER == other.ORDER for other in readers):
-            missing.append(f"{info.name}: NAME '{one.NAME}' or ORDER {one.ORDER} is that of another reader")
-        readers.append(one)
+        reader = cast("FileReader", module)
+        if any(reader.NAME == other.NAME or reader.ORDER == other.ORDER for other in readers):
+            missing.append(f"{info.name}: NAME '{reader.NAME}' or ORDER {reader.ORDER} is that of another reader")
+        readers.append(reader)
     if missing:
         raise IncompleteReader(f"{package}: {'; '.join(missing)}")
-    return {one.NAME: one for one in sorted(readers, key=lambda reader: reader.ORDER)}
+    return {reader.NAME: reader for reader in sorted(readers, key=lambda reader: reader.ORDER)}
 
 
 READERS: dict[str, FileReader] = find_readers(__name__, __path__)

@@ -24,7 +24,7 @@ STATED = {"Acc": "m/s^2", "Gyr": "rad/s", "T": "degC"}
 
 
 def read(name: str, data: bytes, group: str) -> Content:
-    """The fields of one message; one with several instances is a group for each, such as `IMU 0`; `time` in s since power-on."""
+    """The fields of one message; one group for each of its instances, such as `IMU 0`; `time` in s since power-on."""
     reader = library("pymavlink.DFReader", EXTRA, f"{name}: a DataFlash log")
     with tempfile.TemporaryDirectory() as folder:  # the library maps a file
         path = Path(folder) / "log.bin"
@@ -38,10 +38,10 @@ def read(name: str, data: bytes, group: str) -> Content:
                 log.filehandle.close()
     if f"{group} 0" in rows:
         group = f"{group} 0"
-    counts = [(label, len(own)) for label, own in rows.items()]
+    counts = [(label, len(samples)) for label, samples in rows.items()]
     title = chosen(counts, group, name, "no message with a time and numbers in this DataFlash log")
     table = pd.DataFrame(rows[title])
-    clock = next(one for one in CLOCKS if one in table)
+    clock = next(column for column in CLOCKS if column in table)
     table.insert(0, "time", table.pop(clock).to_numpy(float) * CLOCKS[clock])
     return Content(table, (), {"time": "s", **units[title.partition(" ")[0]]})
 
@@ -70,7 +70,7 @@ def _messages(log: Any) -> tuple[dict[str, list[dict[str, float]]], dict[str, di
 
 def _units_of(log: Any, kind: str, fields: list[str]) -> dict[str, str]:
     """The units of a message's fields, as the log states them; those of inertial sensors where it does not."""
-    form = next((one for one in log.formats.values() if one.name == kind), None)
+    form = next((layout for layout in log.formats.values() if layout.name == kind), None)
     stated: dict[str, str] = {}
     for field in fields:
         unit = str(form.get_unit(field)) if form is not None and hasattr(form, "get_unit") else ""

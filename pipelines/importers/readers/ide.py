@@ -1,4 +1,4 @@
-"""enDAQ and Mide recorders (.ide): the subchannels of one channel, each channel with a clock of its own."""
+"""enDAQ and Mide recorders (.ide): the subchannels of one channel, each channel with a separate clock."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ def _number(text: str | bytes, where: str) -> float:
 def _content(channel: Any) -> Content:
     values = np.asarray(channel.getSession().arraySlice(), dtype=np.float64)
     columns, units = {"time": values[0] * 1e-6}, {"time": "s"}
-    for number, one in enumerate(channel.subchannels):
-        label = str(one.name) if str(one.name) not in columns else f"{one.name} ({number + 1})"
+    for number, subchannel in enumerate(channel.subchannels):
+        label = str(subchannel.name) if str(subchannel.name) not in columns else f"{subchannel.name} ({number + 1})"
         columns[label] = values[1 + number]
-        units[label] = str((one.units or ("", ""))[1] or "")
+        units[label] = str((subchannel.units or ("", ""))[1] or "")
     return Content(pd.DataFrame(columns), ("calibrated by the coefficients in the file",), units)

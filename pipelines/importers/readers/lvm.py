@@ -39,7 +39,7 @@ def read(name: str, data: bytes, group: str) -> Content:
     about = _settings(parts[0], None)
     divider = _DIVIDERS.get(next(iter(about.get("Separator", ["tab"])), "tab").lower(), "\t")
     decimal = "," if next(iter(about.get("Decimal_Separator", ["."])), ".") == "," else "."
-    # a header of a segment stands behind the rows of the one before it, divided from them by an empty line
+    # a header of a segment stands behind the rows of the segment before it, divided from them by an empty line
     heads = [parts[1], *(part.replace("\r", "").rpartition("\n\n")[2] for part in parts[2:-1])]
     bodies = [part.replace("\r", "").rpartition("\n\n")[0] or part for part in parts[2:-1]] + [parts[-1]]
     names = [(str(k + 1), body.count("\n")) for k, body in enumerate(bodies)]

@@ -58,7 +58,7 @@ def read(name: str, data: bytes, group: str) -> Content:
 
 
 def _plain(name: str, data: bytes) -> bytes:
-    """The same file with nothing compressed in it, every variable held against its form; those of other classes left out."""
+    """The file without compression; every variable is checked against its form, and variables of other classes are left out."""
     order = "<" if data[_HEADER - 2 : _HEADER] == b"IM" else ">"
     at, parts, size = _HEADER, [data[:_HEADER]], 0
     while at + _TAG <= len(data):
@@ -68,11 +68,11 @@ def _plain(name: str, data: bytes) -> bytes:
             raise DataRejected(
                 f"{name}: a MATLAB file that ends inside a variable ({len(body)} of {count} bytes are there); {REMEDY}"
             )
-        whole = inflated(body, size, len(data), name) if kind == COMPRESSED else data[at : at + _TAG + count]
-        size += len(whole)
+        variable = inflated(body, size, len(data), name) if kind == COMPRESSED else data[at : at + _TAG + count]
+        size += len(variable)
         refuse_larger(size, len(data), name)
-        if _Form(whole, order, name).check():
-            parts.append(whole)
+        if _Form(variable, order, name).check():
+            parts.append(variable)
         at += _TAG + count
     return b"".join(parts)
 
@@ -108,7 +108,7 @@ class _Form:
     at: int = 0
 
     def check(self) -> bool:
-        """Whether it holds numbers, texts, cells and structures only; a variable without the form of one is refused."""
+        """Whether it holds numbers, texts, cells and structures only; a variable of another form is refused."""
         try:
             self._matrix(len(self.data), 0)
         except _OtherClass:
@@ -150,7 +150,7 @@ class _Form:
         return struct.unpack_from(f"{self.order}I", self.data, start)[0]
 
     def _dimensions(self, end: int) -> int:
-        """How many values there are; as many as fit into the file at most."""
+        """Number of values by the dimensions of a variable; refused where they do not fit into the file."""
         start, count, after = self._element(end, _INT32)
         if count % 4 or not 8 <= count <= 4 * 32:
             self._refuse(f"dimensions of {count} bytes", "4 for each of 2 to 32 are needed")
@@ -183,7 +183,7 @@ class _Form:
         self.at = self._element(end, allowed)[2]
 
     def _element(self, end: int, allowed: frozenset[int]) -> tuple[int, int, int]:
-        """Where an element's bytes begin, how many they are, and where the next element is."""
+        """Offset and length of an element's bytes, and the offset of the next element."""
         if self.at + _TAG > end:
             self._refuse("an element beyond its variable", "it must end inside")
         kind, count = struct.unpack_from(f"{self.order}II", self.data, self.at)

@@ -24,25 +24,25 @@ def read(name: str, data: bytes, group: str) -> Content:
     asammdf = library("asammdf", EXTRA, f"{name}: an MDF file")
     with foreign(f"{name}: an MDF file that cannot be read", REMEDY), asammdf.MDF(io.BytesIO(data)) as file:
         counts = {
-            f"{number} {one.channel_group.acq_name}".strip(): (number, int(one.channel_group.cycles_nr))
-            for number, one in enumerate(file.groups)
-            if one.channel_group.cycles_nr
+            f"{number} {entry.channel_group.acq_name}".strip(): (number, int(entry.channel_group.cycles_nr))
+            for number, entry in enumerate(file.groups)
+            if entry.channel_group.cycles_nr
         }
         refuse_larger(
-            8 * sum(len(one.channels) * int(one.channel_group.cycles_nr) for one in file.groups), len(data), name
+            8 * sum(len(entry.channels) * int(entry.channel_group.cycles_nr) for entry in file.groups), len(data), name
         )
         by_number = {str(number): label for label, (number, _) in counts.items()}
         samples = [(label, count) for label, (_, count) in counts.items()]
         title = chosen(samples, by_number.get(group, group), name, "no channel group with samples in this MDF file")
         signals = [_signal(file, counts[title][0], k) for k in range(len(file.groups[counts[title][0]].channels))]
-    own = [signal for signal in signals if signal is not None]
-    if not own:
+    numeric = [signal for signal in signals if signal is not None]
+    if not numeric:
         raise DataRejected(
             f"{name}: group '{title}' has no numeric channel, one is needed; name another with --set group=NAME"
         )
-    columns: dict[str, Any] = {"time": own[0].timestamps}
+    columns: dict[str, Any] = {"time": numeric[0].timestamps}
     units: dict[str, str] = {"time": "s"}
-    for signal in own:
+    for signal in numeric:
         columns[str(signal.name)] = signal.samples
         units[str(signal.name)] = str(signal.unit or "")
     return Content(pd.DataFrame(columns), (), units)

@@ -46,14 +46,21 @@ def read(name: str, data: bytes, group: str) -> Content:
     if not channels:
         raise DataRejected(f"{name}: no samples in this miniSEED file, some are needed; check the file")
     title = chosen(
-        [(one, sum(len(v) for _, v, _ in own[next(iter(own))])) for one, own in channels.items()], group, name
+        [
+            (station, sum(len(v) for _, v, _ in by_channel[next(iter(by_channel))]))
+            for station, by_channel in channels.items()
+        ],
+        group,
+        name,
     )
     frames = [
-        pd.Series(np.concatenate([v for _, v, _ in own]), index=np.concatenate([t for t, _, _ in own]), name=channel)
-        for channel, own in sorted(channels[title].items())
+        pd.Series(
+            np.concatenate([v for _, v, _ in pieces]), index=np.concatenate([t for t, _, _ in pieces]), name=channel
+        )
+        for channel, pieces in sorted(channels[title].items())
     ]
     table = pd.concat([frame[~frame.index.duplicated()] for frame in frames], axis=1, join="inner").sort_index()
-    rates = {rate for own in channels[title].values() for _, _, rate in own}
+    rates = {rate for pieces in channels[title].values() for _, _, rate in pieces}
     since = table.index.to_numpy(np.int64)
     table.insert(0, "time", 1e-6 * (since - since[:1]))
     remarks = (f"station {title}; counts of the digitizer: state their unit and its sensitivity",)

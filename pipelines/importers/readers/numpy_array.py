@@ -33,10 +33,10 @@ def read(name: str, data: bytes, group: str) -> Content:
     else:
         columns = {}
     # the table needs the byte order of this machine
-    kept = {
+    vectors = {
         label: column.astype(column.dtype.newbyteorder("=")) for label, column in columns.items() if column.ndim == 1
     }
-    if not kept or any(column.dtype.kind not in _KINDS for column in kept.values()):
+    if not vectors or any(column.dtype.kind not in _KINDS for column in vectors.values()):
         found = f"{array.ndim} dimensions of type {array.dtype}"
         raise DataRejected(f"{name}: an array of {found}, a matrix or records of numbers are needed; {REMEDY}")
-    return Content(pd.DataFrame(kept))
+    return Content(pd.DataFrame(vectors))

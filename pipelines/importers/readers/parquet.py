@@ -1,4 +1,4 @@
-"""Parquet files as columns: the plain ones, whatever notes of other libraries lie beside them."""
+"""Parquet files as columns: plain columns, whatever notes of other libraries lie beside them."""
 
 from __future__ import annotations
 

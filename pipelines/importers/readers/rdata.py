@@ -51,11 +51,13 @@ def read(name: str, data: bytes, group: str) -> Content:
         found = rdata.conversion.convert(parsed, classes, default_encoding="utf-8")
     objects = found if isinstance(found, dict) else {"frame": found}
     frames = {
-        str(key): one for key, one in objects.items() if isinstance(one, pd.DataFrame) and len(cast("Any", one.columns))
+        str(key): frame
+        for key, frame in objects.items()
+        if isinstance(frame, pd.DataFrame) and len(cast("Any", frame.columns))
     }
     if not frames:
         raise DataRejected(f"{name}: no data frame in this file of R, one is needed; {REMEDY}")
-    frame = frames[chosen([(key, len(one)) for key, one in frames.items()], group, name)]
+    frame = frames[chosen([(key, len(frame)) for key, frame in frames.items()], group, name)]
     return Content(pd.DataFrame({str(column): _plain_column(frame[column]) for column in frame.columns}))
 
 
@@ -66,9 +68,9 @@ def _times(values: Any, attributes: Any) -> Any:
 
 def _long_integers(values: Any, attributes: Any) -> Any:
     """The integers of the package bit64: 64 bits, saved as if they were floating-point numbers; NA is the lowest of them."""
-    whole = np.asarray(values, dtype=float).view(np.int64)
-    gone = whole == np.iinfo(np.int64).min
-    return np.where(gone, np.nan, whole.astype(float)) if gone.any() else whole
+    integers = np.asarray(values, dtype=float).view(np.int64)
+    gone = integers == np.iinfo(np.int64).min
+    return np.where(gone, np.nan, integers.astype(float)) if gone.any() else integers
 
 
 def _plain_column(values: pd.Series) -> pd.Series:

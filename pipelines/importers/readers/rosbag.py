@@ -25,9 +25,9 @@ def read(name: str, data: bytes, group: str) -> Content:
             counts = {topic: info.msgcount for topic, info in bag.topics.items() if info.msgcount}
             topic = chosen([*counts.items()], group, name, "no topic with messages in this bag")
             kind = str(bag.topics[topic].msgtype)
-            own = [connection for connection in bag.connections if connection.topic == topic]
+            connections = [connection for connection in bag.connections if connection.topic == topic]
             rows = [
                 (int(stamp), flattened(bag.deserialize(raw, connection.msgtype)))
-                for connection, stamp, raw in bag.messages(connections=own)
+                for connection, stamp, raw in bag.messages(connections=connections)
             ]
     return content_of(rows, kind, name, topic)

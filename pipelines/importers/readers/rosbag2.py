@@ -31,7 +31,7 @@ def read(name: str, data: bytes, group: str) -> Content:
             foreign(f"{name}: a bag of ROS 2 that cannot be read", REMEDY),
             closing(sqlite3.connect(f"{path.as_uri()}?immutable=1", uri=True)) as bag,
         ):
-            tables = {str(own) for (own,) in bag.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+            tables = {str(table) for (table,) in bag.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
             if not {"topics", "messages"} <= tables:
                 raise DataRejected(
                     f"{name}: an SQLite database without the tables of a bag of ROS 2 (topics, messages); "
@@ -41,7 +41,7 @@ def read(name: str, data: bytes, group: str) -> Content:
             counts = dict(bag.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id"))
             filled = [(str(title), int(counts[number])) for number, title, _ in topics if number in counts]
             topic = chosen(filled, group, name, "no topic with messages in this bag")
-            number, kind = next((number, str(own)) for number, title, own in topics if title == topic)
+            number, kind = next((number, str(type_name)) for number, title, type_name in topics if title == topic)
             store = typesys.get_typestore(typesys.Stores.LATEST)
             if "message_definitions" in tables:
                 _register(typesys, store, bag)
@@ -68,4 +68,4 @@ def _register(typesys: Any, store: Any, bag: sqlite3.Connection) -> None:
         "SELECT topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'"
     ):
         types = typesys.get_types_from_msg(text, kind)
-        store.register({own: fields for own, fields in types.items() if own not in store.fielddefs})
+        store.register({type_name: fields for type_name, fields in types.items() if type_name not in store.fielddefs})

@@ -38,7 +38,7 @@ def read(name: str, data: bytes, group: str) -> Content:
             title: book.get_sheet_by_name(title).to_python() for title in book.sheet_names
         }
     sheets = {title: rows for title, rows in sheets.items() if len(rows) > 1}
-    counts = [(one, len(rows)) for one, rows in sheets.items()]
+    counts = [(title, len(rows)) for title, rows in sheets.items()]
     title = chosen(counts, group, name, "no sheet with rows in this spreadsheet")
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([[_cell(value) for value in row] for row in sheets[title]])

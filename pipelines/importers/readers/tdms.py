@@ -30,12 +30,12 @@ def read(name: str, data: bytes, group: str) -> Content:
     messages = _LibraryLog()
     with foreign(f"{name}: a TDMS file that cannot be read", REMEDY), messages.collected():
         about = nptdms.TdmsFile.read_metadata(io.BytesIO(data))
-        claimed = sum(8 * len(channel) for one in about.groups() for channel in one.channels())
+        claimed = sum(8 * len(channel) for entry in about.groups() for channel in entry.channels())
         refuse_larger(claimed, len(data), name)
         file = nptdms.TdmsFile.read(io.BytesIO(data))
         groups = {
-            one.name: [c for c in one.channels() if len(c) and np.asarray(c[:1]).dtype.kind in "fiubM"]
-            for one in file.groups()
+            entry.name: [c for c in entry.channels() if len(c) and np.asarray(c[:1]).dtype.kind in "fiubM"]
+            for entry in file.groups()
         }
         groups = {label: channels for label, channels in groups.items() if channels}
         counts = [(label, len(channels[0])) for label, channels in groups.items()]
@@ -64,21 +64,21 @@ class _LibraryLog(logging.Handler):
         loggers = [logging.getLogger(name) for name in names]
         before = [(logger, list(logger.handlers), logger.propagate) for logger in loggers]
         try:
-            for one in loggers:
-                one.handlers, one.propagate = [self], False
+            for logger in loggers:
+                logger.handlers, logger.propagate = [self], False
             yield
         finally:
-            for one, handlers, propagate in before:
-                one.handlers, one.propagate = handlers, propagate
+            for logger, handlers, propagate in before:
+                logger.handlers, logger.propagate = handlers, propagate
 
 
 def _content(channels: list[Any], name: str) -> Content:
     longest = max(len(channel) for channel in channels)
-    kept = [channel for channel in channels if len(channel) == longest]
+    equal_length = [channel for channel in channels if len(channel) == longest]
     left_out = [channel.name for channel in channels if len(channel) != longest]
-    columns = {channel.name: np.asarray(channel[:]) for channel in kept}
-    units = {channel.name: str(channel.properties.get("unit_string") or "") for channel in kept}
-    intervals = {float(c.properties["wf_increment"]) for c in kept if "wf_increment" in c.properties}
+    columns = {channel.name: np.asarray(channel[:]) for channel in equal_length}
+    units = {channel.name: str(channel.properties.get("unit_string") or "") for channel in equal_length}
+    intervals = {float(c.properties["wf_increment"]) for c in equal_length if "wf_increment" in c.properties}
     interval = intervals.pop() if len(intervals) == 1 else None
     if len(intervals) >= 1:
         raise DataRejected(
@@ -86,7 +86,7 @@ def _content(channels: list[Any], name: str) -> Content:
             "one is needed; export them apart"
         )
     if interval is not None and interval > 0.0 and "time" not in columns:
-        start = float(kept[0].properties.get("wf_start_offset") or 0.0)
+        start = float(equal_length[0].properties.get("wf_start_offset") or 0.0)
         columns = {"time": start + interval * np.arange(longest), **columns}
         units["time"] = "s"
     remarks = (f"channels of another length were left out: {', '.join(left_out[:6])}",) if left_out else ()

@@ -45,7 +45,7 @@ def read(name: str, data: bytes, group: str) -> Content:
         file = pyuff.UFF(str(path))
         numbers = [k for k, kind in enumerate(file.get_set_types()) if int(kind) == 58]
         sets: list[dict[str, Any]] = [dict(file.read_sets(k)) for k in numbers]
-        records = [_record(one) for one in sets if int(one.get("func_type", 0)) == TIME_RECORD]
+        records = [_record(dataset) for dataset in sets if int(dataset.get("func_type", 0)) == TIME_RECORD]
     if not records:
         raise DataRejected(
             f"{name}: {len(sets)} sets of UFF58, none is a time record (function type 1), one is needed; export time records"
@@ -53,8 +53,8 @@ def read(name: str, data: bytes, group: str) -> Content:
     clocks = {record[1]: len(record[2]) for record in records}
     names = [(_clock_name(clock), count) for clock, count in clocks.items()]
     group_name = chosen(names, group, name)
-    clock = next(one for one in clocks if _clock_name(one) == group_name)
-    kept = [record for record in records if record[1] == clock]
+    clock = next(clock for clock in clocks if _clock_name(clock) == group_name)
+    of_clock = [record for record in records if record[1] == clock]
     if clock[3] != TIME:
         raise DataRejected(
             f"{name}: the abscissa of these records is of type {clock[3]}, time (type {TIME}) is needed; export time records"
@@ -62,13 +62,13 @@ def read(name: str, data: bytes, group: str) -> Content:
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     remarks: list[str] = []
-    for label, _, values, unit, kind in kept:
-        own = label if label not in columns else f"{label} ({len(columns) + 1})"
-        columns[own], units[own] = values, unit
+    for label, _, values, unit, kind in of_clock:
+        column = label if label not in columns else f"{label} ({len(columns) + 1})"
+        columns[column], units[column] = values, unit
         if kind != ACCELERATION:
             what = ORDINATES.get(kind, "not a known quantity")
             remarks.append(
-                f"{shown(own)}: ordinate type {kind} ({what}, unit '{shown(unit)}'), an acceleration is type {ACCELERATION}; "
+                f"{shown(column)}: ordinate type {kind} ({what}, unit '{shown(unit)}'), an acceleration is type {ACCELERATION}; "
                 "check that this channel is one"
             )
     count = len(next(iter(columns.values())))
@@ -94,21 +94,21 @@ def as_file(data: bytes) -> Generator[Path]:
         yield path
 
 
-def _record(one: dict[str, Any]) -> tuple[str, tuple[float, float, int, int], np.ndarray, str, int]:
+def _record(dataset: dict[str, Any]) -> tuple[str, tuple[float, float, int, int], np.ndarray, str, int]:
     """Label, clock (first instant, interval, count, abscissa type), values, unit and ordinate type of a set."""
-    values = np.asarray(one["data"])
+    values = np.asarray(dataset["data"])
     if values.dtype.kind == "c":
         values = np.real(values)
-    x = np.asarray(one["x"], dtype=np.float64)
-    interval = float(one.get("abscissa_inc") or 0.0)
-    if not one.get("abscissa_spacing") or interval <= 0.0:
+    x = np.asarray(dataset["x"], dtype=np.float64)
+    interval = float(dataset.get("abscissa_inc") or 0.0)
+    if not dataset.get("abscissa_spacing") or interval <= 0.0:
         interval = float(np.median(np.diff(x))) if x.size > 1 else 0.0
-    direction = _DIRECTIONS.get(int(one.get("rsp_dir") or 0), "")
-    parts = [str(part).strip() for part in (one.get("id1") or "", one.get("rsp_node") or "", direction)]
+    direction = _DIRECTIONS.get(int(dataset.get("rsp_dir") or 0), "")
+    parts = [str(part).strip() for part in (dataset.get("id1") or "", dataset.get("rsp_node") or "", direction)]
     label = " ".join(filter(None, parts)) or "record"
-    unit = str(one.get("ordinate_axis_units_lab") or "").strip()
-    clock = (float(x[0]) if x.size else 0.0, interval, values.size, int(one.get("abscissa_spec_data_type") or 0))
-    return label, clock, values, "" if unit == "NONE" else unit, int(one.get("ordinate_spec_data_type") or 0)
+    unit = str(dataset.get("ordinate_axis_units_lab") or "").strip()
+    clock = (float(x[0]) if x.size else 0.0, interval, values.size, int(dataset.get("abscissa_spec_data_type") or 0))
+    return label, clock, values, "" if unit == "NONE" else unit, int(dataset.get("ordinate_spec_data_type") or 0)
 
 
 def _clock_name(clock: tuple[float, float, int, int]) -> str:

@@ -31,11 +31,11 @@ def read(name: str, data: bytes, group: str) -> Content:
         log = pyulog.ULog(io.BytesIO(data))
         start = float(log.start_timestamp)
         messages: dict[str, Any] = {
-            f"{one.name} {one.multi_id}": one for one in log.data_list if len(one.data["timestamp"])
+            f"{message.name} {message.multi_id}": message for message in log.data_list if len(message.data["timestamp"])
         }
         if f"{group} 0" in messages:
             group = f"{group} 0"
-        counts = [(label, len(one.data["timestamp"])) for label, one in messages.items()]
+        counts = [(label, len(message.data["timestamp"])) for label, message in messages.items()]
         title = chosen(counts, group, name, "no message with samples in this ULog")
         message = messages[title]
         fields = {key: np.asarray(values) for key, values in message.data.items() if key != "timestamp"}

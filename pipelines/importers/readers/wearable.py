@@ -48,24 +48,24 @@ def read(name: str, data: bytes, group: str) -> Content:
         with foreign(f"{name}: a record of a worn logger that cannot be read", REMEDY), reserving(RESERVED * packed):
             found = actfast.read(path)
     series: dict[str, dict[str, Any]] = found["timeseries"]
-    own = next((one for one in series.values() if len(one.get("acceleration", ()))), None)
-    if own is None:
+    fast = next((part for part in series.values() if len(part.get("acceleration", ()))), None)
+    if fast is None:
         raise DataRejected(
             f"{name}: {found['format']}: no samples of acceleration were found, some are needed; "
             "export it as CSV with its maker's program (ActiGraph's packets ACTIVITY2 are not read)"
         )
-    if packed and FROM_PARAMETERS not in found["metadata"]:  # the library would take a rate and a scale of its own
+    if packed and FROM_PARAMETERS not in found["metadata"]:  # the library would assume a rate and a scale
         raise DataRejected(
             f"{name}: {found['format']}: no packet of parameters, which state rate and scale; {REMEDY.partition(', or ')[2]}"
         )
-    when = np.asarray(own["datetime"], dtype=np.int64)  # ns since 1970: no float holds them
+    when = np.asarray(fast["datetime"], dtype=np.int64)  # ns since 1970: no float holds them
     columns: dict[str, Any] = {"time": 1e-9 * (when - when[0])}
     units = {"time": "s"}
     for kind, (unit, short) in COLUMNS.items():
-        if kind in own:
-            columns |= {f"{short}_{axis}": own[kind][:, k].astype(np.float64) for k, axis in enumerate("xyz")}
+        if kind in fast:
+            columns |= {f"{short}_{axis}": fast[kind][:, k].astype(np.float64) for k, axis in enumerate("xyz")}
             units |= {f"{short}_{axis}": unit for axis in "xyz"}
-    slow = next((one for one in series.values() if len(one.get("temperature", ()))), None)
+    slow = next((part for part in series.values() if len(part.get("temperature", ()))), None)
     remarks = [f"{found['format']}: acceleration in g, as the logger converts it"]
     if slow is not None:
         at = 1e-9 * (np.asarray(slow["datetime"], dtype=np.int64) - when[0])

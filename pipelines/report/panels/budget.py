@@ -48,7 +48,7 @@ TEMPLATE = """\
 
 
 def render(report: ReportContext) -> str:
-    """The budget; a notice for runs without one, such as runs of earlier versions."""
+    """The budget; a notice for runs without a budget, such as those of earlier versions."""
     sums, station = report.tables.get("uncertainties", pd.DataFrame()), report.about.get("station") or {}
     recipe = report.recipe
     entries = {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}
@@ -62,17 +62,17 @@ def render(report: ReportContext) -> str:
         source=str(entries.get("grade_source", "assumed")).replace("_", " "),
         plot=still(shares_plot(_shares(report.tables["budget"], first))) if len(sums) else "",
         missing=missing if len(sums) else {},
-        references=[{**NO_REFERENCE, **one} for one in station.get("reference", [])],
+        references=[{**NO_REFERENCE, **reference} for reference in station.get("reference", [])],
         seen=_seen(sums),
         risks=_risks(report.tables.get("lot_risks")),
     )
 
 
 def _shares(budget: pd.DataFrame, unit: str) -> dict[str, dict[str, float]]:
-    own = budget[budget["unit"] == unit]
+    of_unit = budget[budget["unit"] == unit]
     shares: dict[str, dict[str, float]] = {}
     for (quantity, axis), title in PICTURED.items():
-        rows = own[(own["quantity"] == quantity) & (own["axis"] == axis)]
+        rows = of_unit[(of_unit["quantity"] == quantity) & (of_unit["axis"] == axis)]
         if len(rows):
             shares[title] = {LABELS[str(r["contribution"])]: float(r["share"]) for r in rows_of(rows)}
     return shares

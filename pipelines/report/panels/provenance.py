@@ -14,7 +14,7 @@ TEMPLATE = """\
 
 
 def render(report: ReportContext) -> str:
-    """One table."""
+    """The provenance of the run as a table."""
     run, about = report.run, report.about
     manifests = [run.manifest(name) for name in run.tables()]
     code = {manifest["stage"]: manifest["code"][:12] for manifest in manifests}

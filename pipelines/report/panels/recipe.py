@@ -18,7 +18,7 @@ TEMPLATE = """\
 
 
 def render(report: ReportContext) -> str:
-    """One table."""
+    """The recipe as a table, and how ``[stop]`` ended the run."""
     end = early_end(report.run)
     text = "" if end is None else "; ".join([early_end_sentence(end) or "as planned", *told_sentences(end)])
     dwell = "" if end is None else dwell_words(end)

@@ -49,7 +49,7 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _risk(row: dict[str, Any]) -> str:
-    """PFA of an accepted figure, PFR of one that is not; empty for runs of earlier versions."""
+    """PFA of an accepted figure, PFR of a rejected figure; empty for runs of earlier versions."""
     if not np.isfinite(row.get("pfa", np.nan)):
         return ""
     name, value = ("PFA", row["pfa"]) if row["outcome"] == "pass" else ("PFR", row["pfr"])

@@ -37,10 +37,10 @@ def render(unit: UnitContext) -> str | None:
     rows = unit.tables["noise"]
     lines: list[dict[str, Any]] = []
     for term, name in NAMES.items():
-        own = rows[rows["term"] == term]
-        if len(own):
-            cells = {row["axis"]: _cell(row) for row in rows_of(own)}
-            lines.append({"name": name, "unit": own["unit_text"].iloc[0], "cells": cells})
+        of_term = rows[rows["term"] == term]
+        if len(of_term):
+            cells = {row["axis"]: _cell(row) for row in rows_of(of_term)}
+            lines.append({"name": name, "unit": of_term["unit_text"].iloc[0], "cells": cells})
     notes = list(dict.fromkeys(_notes(rows)))
     return fill(TEMPLATE, lines=lines, axes=axes_of(lines), notes=notes) if lines else None
 

@@ -33,12 +33,12 @@ TEMPLATE = """\
 
 
 def render(unit: UnitContext) -> str | None:
-    """Every procedure of the recipe's list that has figures of its own; None for recipes without a list."""
+    """Every procedure of the recipe's list that has figures; None for recipes without a list."""
     parts = unit.report.recipe.get("procedures") or []
     tables = unit.tables
     if not parts or "procedure_figures" not in tables:
         return None
-    shown = [one for number in range(len(parts)) if (one := _procedure(unit, number, parts[number])) is not None]
+    shown = [panel for number in range(len(parts)) if (panel := _procedure(unit, number, parts[number])) is not None]
     return fill(TEMPLATE, procedures=shown, coverage=f"{unit.report.coverage:g}") if shown else None
 
 
@@ -48,8 +48,8 @@ def _procedure(unit: UnitContext, number: int, content: dict[str, Any]) -> dict[
     procedure = PROCEDURES.get(str(content.get("kind")))
     if not isinstance(procedure, Evaluated) or figures.empty:
         return None
-    whole = unit.report.tables["procedure_findings"]
-    findings = whole[(whole["number"] == number) & whole["unit"].isin([unit.unit, ""])]
+    every_finding = unit.report.tables["procedure_findings"]
+    findings = every_finding[(every_finding["number"] == number) & every_finding["unit"].isin([unit.unit, ""])]
     return {
         "title": procedure.title,
         "lines": [_line(unit, row, {f.name: f.meaning for f in procedure.figures}) for row in rows_of(figures)],

@@ -58,8 +58,8 @@ def chart(soaks: pd.DataFrame) -> Chart:
     traces: list[Trace] = []
     known = soaks[soaks["identified"]]
     for axis in axes_among(known["axis"]):
-        own = known[known["axis"] == axis]
-        at, value, low, high = (own[c].to_numpy(dtype=float) for c in ("temperature_C", "value", "low", "high"))
+        of_axis = known[known["axis"] == axis]
+        at, value, low, high = (of_axis[c].to_numpy(dtype=float) for c in ("temperature_C", "value", "low", "high"))
         traces.append(Trace(f"axis {axis}", at, value, "points", axis, error=0.5 * (high - low)))
         curve = density_curve(at, value, (high - low) / (2.0 * NORMAL_95))
         if curve is not None:

@@ -40,12 +40,12 @@ def find_figures(package: str, path: Iterable[str]) -> dict[str, FigureKind]:
     for info in iter_modules(path):
         if info.name == SHARED:
             continue
-        own = getattr(import_module(f"{package}.{info.name}"), "FIGURES", ())
-        if not own or not all(isinstance(kind, FigureKind) for kind in own):
+        defined = getattr(import_module(f"{package}.{info.name}"), "FIGURES", ())
+        if not defined or not all(isinstance(kind, FigureKind) for kind in defined):
             raise IncompleteFigure(
                 f"{package}.{info.name}: no FIGURES, one is needed; define FIGURES = (FigureKind(…),)"
             )
-        kinds += own
+        kinds += defined
     for attribute in ("name", "order"):
         value, count = Counter(getattr(kind, attribute) for kind in kinds).most_common(1)[0]
         if count > 1:
@@ -58,7 +58,7 @@ def find_figures(package: str, path: Iterable[str]) -> dict[str, FigureKind]:
 FIGURES: Mapping[str, FigureKind] = find_figures(__name__, __path__)
 UNITS: Mapping[str, str] = {
     **{name: kind.unit for name, kind in FIGURES.items()},
-    **{name: one.unit for name, one in PROCEDURE_FIGURES.items()},
+    **{name: figure.unit for name, figure in PROCEDURE_FIGURES.items()},
 }
 """The unit of each figure, of the calibration or of a procedure, against which limits files are checked."""
 
@@ -66,12 +66,12 @@ SPELT = str.maketrans({"µ": "u", "²": "2", "³": "3", "/": "_", "√": "rt"})
 
 
 def figure_label(name: str) -> str:
-    """What a figure is, in a few words; of one of a procedure, or of another version, the words of its key without the unit."""
+    """The label of a figure; for figures of procedures and of other versions, its key in words, without the unit."""
     if name in FIGURES:
         return FIGURES[name].label
     unit = UNITS.get(name, "").replace("%", "percent").translate(SPELT)
-    kept = name[: -len(unit) - 1] if name.lower().endswith(f"_{unit}".lower()) else name
-    return kept.replace("_", " ")
+    words = name[: -len(unit) - 1] if name.lower().endswith(f"_{unit}".lower()) else name
+    return words.replace("_", " ")
 
 
 def plain_reason(text: str) -> str:

@@ -65,7 +65,7 @@ class LotCoefficients:
         self._noise: dict[str, Array] = {}
 
     def of(self, unit: int) -> UnitCoefficients:
-        """The coefficients of the unit at a place of the lot."""
+        """The coefficients of the unit with this index in the lot."""
         return UnitCoefficients(self, unit)
 
     def effect(self, effect: str, unit: int) -> tuple[Array, Array, Array]:
@@ -81,19 +81,19 @@ class LotCoefficients:
             return np.zeros_like(self.effect(effect, unit)[1])
         if effect not in self._noise:
             self._noise[effect] = self._calibration.standard_error(effect)
-        whole, noise = self.effect(effect, unit)[1], self._noise[effect][unit]
-        return np.sqrt(np.maximum(whole**2 - noise**2, 0.0))
+        total, noise = self.effect(effect, unit)[1], self._noise[effect][unit]
+        return np.sqrt(np.maximum(total**2 - noise**2, 0.0))
 
     def _with_budget(self) -> Calibration:
         """The calibration with the budget's covariance of each axis added to that of the noise."""
         if self.stated is None:
             return self._calibration
         p = self._calibration.covariance.shape[-1]
-        own = np.stack(
+        blocks = np.stack(
             [self.stated[:, a * p : (a + 1) * p, a * p : (a + 1) * p] for a in range(len(self._calibration.axes))],
             axis=1,
         )
-        return replace(self._calibration, covariance=self._calibration.covariance + own)
+        return replace(self._calibration, covariance=self._calibration.covariance + blocks)
 
     def angle(self, unit: int, first: int, second: int) -> tuple[float, float] | None:
         """Deviation from 90° of the angle between two axes and its standard uncertainty, rad; None without misalignment."""
@@ -102,10 +102,10 @@ class LotCoefficients:
         names, p = self._calibration.names, self._calibration.covariance.shape[-1]
         columns = []
         for axis, other in ((first, second), (second, first)):
-            own = [k for k, (effect, _) in enumerate(names[axis]) if effect == "misalignment"]
-            if not own:
+            turns = [k for k, (effect, _) in enumerate(names[axis]) if effect == "misalignment"]
+            if not turns:
                 return None
-            columns.append((axis, own[(other - axis - 1) % 3]))
+            columns.append((axis, turns[(other - axis - 1) % 3]))
         scale = np.abs(np.diagonal(self._calibration.response[unit]))
         value = sum(self._calibration.coefficients[unit, axis, k] / scale[axis] for axis, k in columns)
         variance = sum(self._calibration.covariance[unit, axis, k, k] / scale[axis] ** 2 for axis, k in columns)
@@ -137,9 +137,9 @@ class UnitCoefficients(NamedTuple):
         if not values.size:
             return None
         spread = (factor * errors / scale).ravel()
-        place = int(np.argmax(np.abs(values) + guard * spread))
-        shared = (factor * self.lot.shared(effect, self.unit) / scale).ravel()[place]
-        return Value(float(values[place]), float(spread[place]), shared=abs(float(shared)))
+        worst = int(np.argmax(np.abs(values) + guard * spread))
+        shared = (factor * self.lot.shared(effect, self.unit) / scale).ravel()[worst]
+        return Value(float(values[worst]), float(spread[worst]), shared=abs(float(shared)))
 
 
 class BudgetRow(NamedTuple):
@@ -191,11 +191,11 @@ class FigureKind:
 
     Parameters
     ----------
-    name : key in limits files and tables; ends in the unit where it has one.
+    name : key in limits files and tables; ends in the unit of the figure where there is a unit.
     unit : unit of the value, "1" for a ratio.
     meaning : of the value, a sentence of the reference.
     label : heading in the report.
-    order : place in tables, ascending.
+    order : the figures are listed by it, ascending.
     value : the figure of a unit, None where its tables do not yield one.
     missing : what a recipe lacks to yield the figure, empty where it lacks nothing.
     """

@@ -29,14 +29,14 @@ def _three_axes(recipe: Recipe) -> str:
 
 def _linearity(tables: UnitTables) -> Value | None:
     """From the nonlinear coefficients of the model; tumbling covers ±1 g only, and only this part of the range is judged."""
-    own, lot = tables.coefficients, tables.coefficients.lot
-    if not any(lot.effect(effect, own.unit)[0].shape[-1] for effect in ORDERS):
+    coefficients, lot = tables.coefficients, tables.coefficients.lot
+    if not any(lot.effect(effect, coefficients.unit)[0].shape[-1] for effect in ORDERS):
         return None
     force = np.linspace(-1.0, 1.0, POINTS)
-    scale = lot.effect("scale", own.unit)[2]
+    scale = lot.effect("scale", coefficients.unit)[2]
     curve, variance = np.zeros((len(scale), POINTS)), np.zeros(len(scale))
     for effect, order in ORDERS.items():
-        values, errors, scale = lot.effect(effect, own.unit)
+        values, errors, scale = lot.effect(effect, coefficients.unit)
         if values.shape[-1]:
             curve += (values / scale)[:, :1] * force**order
             variance += ((errors / scale)[:, 0] * _deviation(force**order)) ** 2

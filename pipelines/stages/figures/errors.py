@@ -13,7 +13,7 @@ ALARM = 0.01  # probability that a good unit shows an error beyond what the unce
 
 
 def rms(errors: np.ndarray) -> Value:
-    """Root mean square, with the standard uncertainty rms/√(2n) of one from n normal values."""
+    """Root mean square of n normal values, with its standard uncertainty rms/√(2n)."""
     value = float(np.sqrt(np.mean(errors**2)))
     return Value(value, value / np.sqrt(2.0 * errors.size))
 

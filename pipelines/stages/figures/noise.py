@@ -23,22 +23,22 @@ def _worst_axis(term: str) -> Callable[[UnitTables], Value | None]:
         rows = tables.noise
         if not len(rows) or (term == TERM and term not in set(rows["term"].tolist())):
             return None
-        by_axis = [_noise_term(place, rows) for place in np.flatnonzero(rows["term"] == term).tolist()]
+        by_axis = [_noise_term(row, rows) for row in np.flatnonzero(rows["term"] == term).tolist()]
         return max(by_axis, key=lambda figure: figure.reach(tables.guard))
 
     return value
 
 
-def _noise_term(place: int, rows: UnitRows) -> Value:
-    value, low, high = (float(rows[column][place]) for column in ("value", "low", "high"))
-    axis = rows["axis"][place]
-    if rows["identified"][place]:
+def _noise_term(row: int, rows: UnitRows) -> Value:
+    value, low, high = (float(rows[column][row]) for column in ("value", "low", "high"))
+    axis = rows["axis"][row]
+    if rows["identified"][row]:
         return Value(value, (high - low) / (2.0 * NORMAL_95), dof=dof_of_upper(high / value) if value > 0.0 else np.nan)
-    if rows["term"][place] == "B":  # two upper bounds: the smaller holds
+    if rows["term"][row] == "B":  # two upper bounds: the smaller holds
         bound = rows["high"][(rows["term"] == B_BOUND) & (rows["axis"] == axis)]
         high = float(np.fmin(high, bound[0]))
     if not np.isfinite(high):
-        why = str(rows["note"][place]) if "note" in rows else "no upper limit"
+        why = str(rows["note"][row]) if "note" in rows else "no upper limit"
         return Value(np.inf, 0.0, f"axis {axis}: {why}")
     return Value(high, 0.0)
 

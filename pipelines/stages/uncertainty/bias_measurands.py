@@ -69,6 +69,6 @@ def bias_measurands(noise: BiasNoise) -> dict[str, Array]:
 
 
 def _of_variance_one(kind: tuple[Array, float], noise: BiasNoise) -> tuple[Array, float]:
-    """A walk's covariance and variance for one that has the variance one at the end of all dwells."""
+    """Covariance and variance of a random walk whose variance is 1 at the end of all dwells."""
     span = max(float(np.ptp(noise.every)), 1e-9)
     return kind[0] / span, kind[1] / span

@@ -64,13 +64,13 @@ def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: Bud
     """The dwells of a lot on which the influences act."""
     soak = np.zeros(lot.dwells.size, dtype=np.int64)
     if "soak" in dwells:
-        own = np.flatnonzero(dwells["unit"].to_numpy(dtype=object) == lot.units[0])
-        own = own[np.argsort(dwells["dwell"].to_numpy()[own], kind="stable")]
-        rows = own[np.searchsorted(dwells["dwell"].to_numpy()[own], lot.dwells)]
+        rows_of_unit = np.flatnonzero(dwells["unit"].to_numpy(dtype=object) == lot.units[0])
+        rows_of_unit = rows_of_unit[np.argsort(dwells["dwell"].to_numpy()[rows_of_unit], kind="stable")]
+        rows = rows_of_unit[np.searchsorted(dwells["dwell"].to_numpy()[rows_of_unit], lot.dwells)]
         soak = dwells["soak"].to_numpy()[rows].astype(np.int64)
     read = lot.state.temperature if lot.state.temperature is not None else np.full(lot.dwells.size, terms.room_C)
     mean = np.broadcast_to(read, (len(lot.units), lot.dwells.size)).mean(axis=0)
-    target = np.array([mean[soak == one].mean() for one in soak])
+    target = np.array([mean[soak == number].mean() for number in soak])
     scale = np.abs(_own_scale(response, lot.state.axes)).reshape(-1, len(lot.state.axes)).mean(axis=0)
     return DwellConditions(lot.state, soak, target, terms.soak_min_s, terms.room_C, scale)
 
@@ -84,14 +84,14 @@ def propagate(
     used = lot.of_kind("dwell")
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     physical = with_device_temperature(model, calibration.response, terms.stability, calibration.axes)
-    own, scattered = influences(terms.stated, at, terms.stability)
-    whole = sensitivity(physical, lot.state, own, scattered)
+    inputs, scattered = influences(terms.stated, at, terms.stability)
+    source = sensitivity(physical, lot.state, inputs, scattered)
     design = fit_design(model, lot.state, dwell_noise(lot, wander, used), used)
-    fitted = replace(whole, changes=whole.changes[..., used, :, :])
+    fitted = replace(source, changes=source.changes[..., used, :, :])
     fit = propagated(design, fitted, calibration.response)
     return VarianceParts(
         fit=fit,
-        verification=whole.changes[..., ~used, :, :],
+        verification=source.changes[..., ~used, :, :],
         visible_share=lambda: design.visible_share(fitted.changes, fit.coefficients),
     )
 
@@ -113,8 +113,8 @@ def with_device_temperature(
         ("scale_temperature", stability.scale_temperature_ppm_K),
     ):
         if effect not in effects and value > 0.0:
-            own = value / MICRO * np.abs(_own_scale(response, axes))[..., None]
-            coefficients = np.concatenate([coefficients, own], axis=-1)
+            columns = value / MICRO * np.abs(_own_scale(response, axes))[..., None]
+            coefficients = np.concatenate([coefficients, columns], axis=-1)
             effects.append(effect)
     return MeasurementModel(effects, coefficients, model.nonlinear)
 

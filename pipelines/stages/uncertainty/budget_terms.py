@@ -27,7 +27,7 @@ MANY = 1e6
 class BudgetTables:
     """The tables that a budget is computed from.
 
-    prior : None for a fit without one
+    prior : None for a fit without a prior
     lot, calibration : dwells with their history, and coefficients, where other stages have converted them already
     results : of comparisons; None where the run has none
     """
@@ -50,11 +50,13 @@ class BudgetTables:
         return (self.lot or LotTables(self.dwells, self.history)).fitted_kinds
 
     def parts(self) -> list[BudgetTables]:
-        """Those of units with the same dwells; none where no unit was fitted."""
+        """The tables in parts whose units have the same dwells; empty where no unit was fitted."""
         lots = (self.lot or LotTables(self.dwells, self.history)).parts
         if self.coefficients.empty or len(lots) == 1:
             return [] if self.coefficients.empty else [self]
-        tables = {one.name: value for one in fields(self) if isinstance(value := getattr(self, one.name), pd.DataFrame)}
+        tables = {
+            field.name: value for field in fields(self) if isinstance(value := getattr(self, field.name), pd.DataFrame)
+        }
         return [
             replace(
                 self, lot=lot, calibration=None, **{name: own_rows(table, lot.dwells) for name, table in tables.items()}
@@ -86,15 +88,15 @@ class BudgetTerms:
 
     @property
     def follows(self) -> FollowedSupply | None:
-        """How the outputs follow a supply that is measured; None where it is not measured, or they do not follow it.
+        """How the outputs follow the measured supply; None where it is not measured, or the outputs do not follow it.
 
         None as well for runs of earlier versions, which state no nominal supply and are as they were read.
         """
-        own = self.stability
+        dut = self.stability
         supply = None if self.stated is None else self.stated.supply
-        if own is None or own.supply_V is None or supply is None or not supply.ratio_measured or own.ratiometric == 0.0:
+        if dut is None or dut.supply_V is None or supply is None or not supply.ratio_measured or dut.ratiometric == 0.0:
             return None
-        return FollowedSupply(own.supply_V, own.ratiometric)
+        return FollowedSupply(dut.supply_V, dut.ratiometric)
 
     @property
     def switch_on_dof(self) -> float:
@@ -108,7 +110,7 @@ class BudgetTerms:
         return self.stated is not None and reads_own_temperature(self.stated, self.stability)
 
     def document(self) -> dict[str, Any]:
-        """As JSON values."""
+        """The statements as JSON values, for the parameters of a stage."""
         if self.stated is None:
             return {"uncertainty": None}
         return {
@@ -144,12 +146,12 @@ def terms_of(
 
 
 def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
-    """The terms of an archived run, from what is kept beside it; None for runs that state none."""
+    """The terms of an archived run, from its ``run.json``; None for runs without a stated uncertainty."""
     station, recipe = about.get("station") or {}, about.get("recipe") or {}
     stated = merged(
         *(
-            Uncertainty.model_validate(one["uncertainty"]) if one.get("uncertainty") else None
-            for one in (station, recipe)
+            Uncertainty.model_validate(part["uncertainty"]) if part.get("uncertainty") else None
+            for part in (station, recipe)
         )
     )
     if stated is None:
@@ -160,7 +162,7 @@ def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
         stated=stated,
         stability=Stability.model_validate(stability) if stability else None,
         certificate=CertificateTerms.model_validate(certificate or {"validity_months": months}),
-        references=tuple(Reference.model_validate(one) for one in station.get("reference", [])),
+        references=tuple(Reference.model_validate(reference) for reference in station.get("reference", [])),
         soak_min_s=float(recipe.get("soak_min_s", 0.0)),
         dwell_s=float(recipe.get("dwell_s", 1.0)),
         room_C=float((station.get("pace") or {}).get("room_C", Pace().room_C)),

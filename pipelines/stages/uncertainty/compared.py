@@ -51,24 +51,26 @@ def compared_tables(results: pd.DataFrame, terms: BudgetTerms) -> dict[str, pd.D
             "axis": row["axis"],
             "unit_text": row["unit_text"],
         }
-        own = list(_contributions(row, terms))
-        sums.append(about | _sum(row, own) | {"frame": terms.certificate.frame, "setting": row["setting"]})
-        whole = sum(one["u"] ** 2 for one in own)
-        parts += [about | one | {"share": one["u"] ** 2 / whole if whole > 0.0 else 0.0} for one in own]
+        contributions = list(_contributions(row, terms))
+        sums.append(about | _sum(row, contributions) | {"frame": terms.certificate.frame, "setting": row["setting"]})
+        variance = sum(part["u"] ** 2 for part in contributions)
+        parts += [
+            about | part | {"share": part["u"] ** 2 / variance if variance > 0.0 else 0.0} for part in contributions
+        ]
     return {"budget": pd.DataFrame(parts), "uncertainties": pd.DataFrame(sums)}
 
 
 def _stated(row: Mapping[str, Any], terms: BudgetTerms) -> dict[str, Entry]:
-    own = None if terms.stated is None else terms.stated.comparison(row["role"], row["setting"])
-    return {} if own is None else own.entries
+    comparison = None if terms.stated is None else terms.stated.comparison(row["role"], row["setting"])
+    return {} if comparison is None else comparison.entries
 
 
 def _contributions(row: Mapping[str, Any], terms: BudgetTerms) -> Iterator[dict[str, Any]]:
     """The contributions to one result, without those that are exactly 0."""
-    yield _own("record_noise", float(row["u_noise"]), "A", float(row["dof"]), "the records of the procedure")
+    yield _row_of_unit("record_noise", float(row["u_noise"]), "A", float(row["dof"]), "the records of the procedure")
     for name, source in OF_RECIPE.items():
         if row[f"u_{name}"] > 0.0:
-            yield _own(name, float(row[f"u_{name}"]), "B", float("inf"), source)
+            yield _row_of_unit(name, float(row[f"u_{name}"]), "B", float("inf"), source)
     known = _stated(row, terms)
     for name in (name for name in TERMS if row[f"c_{name}"] != 0.0 and name in known):
         entry, sensitivity = known[name], abs(float(row[f"c_{name}"]))
@@ -86,24 +88,24 @@ def _contributions(row: Mapping[str, Any], terms: BudgetTerms) -> Iterator[dict[
             }  # fmt: skip
 
 
-def _own(name: str, u: float, kind: str, dof: float, source: str) -> dict[str, Any]:
+def _row_of_unit(name: str, u: float, kind: str, dof: float, source: str) -> dict[str, Any]:
     return {
         "contribution": name, "type": kind, "distribution": "normal", "scope": "unit", "input_unit": "", "source": source,
         "u": u, "divisor": 1.0, "stated": u, "dof": dof, "visible": float("nan"), "sensitivity": 1.0,
     }  # fmt: skip
 
 
-def _sum(row: Mapping[str, Any], own: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+def _sum(row: Mapping[str, Any], contributions: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """Value, u of both types and together, ν_eff, k and U of one result."""
-    parts = list(own)
+    parts = list(contributions)
     u = np.array([part["u"] for part in parts])
-    random = np.array([one["type"] == "A" for one in parts])
-    dof = effective_degrees(u[None, :], np.array([one["dof"] for one in parts])[None, :])
-    k, whole = float(coverage_factors(dof)[0]), float(np.sqrt(np.sum(u**2)))
+    random = np.array([part["type"] == "A" for part in parts])
+    dof = effective_degrees(u[None, :], np.array([part["dof"] for part in parts])[None, :])
+    k, combined = float(coverage_factors(dof)[0]), float(np.sqrt(np.sum(u**2)))
     order = [int(n) for n in np.argsort(-u, kind="stable")[:LARGEST] if u[n] > 0.0]
-    largest = ", ".join(f"{LABELS[parts[n]['contribution']]} {100.0 * (u[n] / whole) ** 2:.0f} %" for n in order)
+    largest = ", ".join(f"{LABELS[parts[n]['contribution']]} {100.0 * (u[n] / combined) ** 2:.0f} %" for n in order)
     return {
         "value": float(row["value"]), "u_a": float(np.sqrt(np.sum(u[random] ** 2))),
-        "u_b": float(np.sqrt(np.sum(u[~random] ** 2))), "u": whole, "dof": float(dof[0]), "k": k, "expanded": k * whole,
+        "u_b": float(np.sqrt(np.sum(u[~random] ** 2))), "u": combined, "dof": float(dof[0]), "k": k, "expanded": k * combined,
         "shown": float("nan"), "unseen": float("nan"), "largest": largest,
     }  # fmt: skip

@@ -58,32 +58,32 @@ def lot_references(tables: BudgetTables, terms: BudgetTerms) -> LotReferences | 
     if len(lot.units) < FEWEST:
         return "one unit alone: errors of the table cannot be separated from its noise; measure two or more together"
     evidence, groups, along = _evidence(lot, tables, terms, terms.stated)
-    first = int(along[0])  # they are the last ones, and taken to be zero
-    kept = CommonEvidence(evidence.information[:first, :first], evidence.projection[:first])
-    looked = sizes(kept, groups)
-    found = contradictions(kept, groups, looked)
+    first = int(along[0])  # the influences along the force are the last, and taken to be zero
+    of_table = CommonEvidence(evidence.information[:first, :first], evidence.projection[:first])
+    looked = sizes(of_table, groups)
+    found = contradictions(of_table, groups, looked)
     return LotReferences(tuple(found), tuple(looked), probability(looked), beyond(evidence, along, groups, found))
 
 
 def _evidence(
     lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty
 ) -> tuple[CommonEvidence, dict[str, Places], Places]:
-    """The evidence on the common influences, the places of those that are judged, and those along the force (the last ones)."""
+    """The evidence on the common influences, and the indices of the judged influences and of those along the force (the last)."""
     calibration, state = tables.calibrated(), lot.state
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     physical = with_device_temperature(model, calibration.response, terms.stability, calibration.axes)
     if stated.pose is not None:  # their repeatability also where the budget leaves it to the scatter of the fit
         stated = stated.model_copy(update={"pose": stated.pose.model_copy(update={"seen_in_residuals": False})})
     inputs, scattered = influences(stated, conditions(lot, tables.dwells, calibration.response, terms), terms.stability)
-    common = [one for one in inputs if one.scope in COMMON]
-    whole = sensitivity(physical, state, common, scattered)
+    common = [error for error in inputs if error.scope in COMMON]
+    source = sensitivity(physical, state, common, scattered)
     shape = (*lot.output.shape, -1)
     along = _each_dwell(ALONG_G * difference(physical, state, Errors(gravity=1.0)), lot.output.shape)
     sensor, station = design.split(model.effects)
     columns = design.local_columns(sensor, state, model.nonlinear)
     columns = np.broadcast_to(columns, (len(lot.units), *columns.shape[-3:]))
     left = lot.output - predict(model.effects, state, model.coefficients, model.nonlinear)
-    parts = [np.broadcast_to(whole.changes, (*lot.output.shape, whole.changes.shape[-1])), along]
+    parts = [np.broadcast_to(source.changes, (*lot.output.shape, source.changes.shape[-1])), along]
     if station:
         shared = design.shared_columns(station, state, model.nonlinear, calibration.response)
         parts.insert(
@@ -91,13 +91,13 @@ def _evidence(
         )
     free = parts[0].shape[-1] if station else 0
     evidence = common_evidence(columns, np.concatenate(parts, axis=-1), left, _noise(lot, left, model.effects))
-    names = np.array(whole.contributions, dtype=object)
+    names = np.array(source.contributions, dtype=object)
     groups = {name: np.flatnonzero(names == name) for name in JUDGED if np.any(names == name)}
     return without(evidence, np.arange(free)), groups, names.size + np.arange(along.shape[-1])
 
 
 def _each_dwell(change: Array, shape: tuple[int, ...]) -> Array:
-    """A change (units, n, 3) as one of each dwell alone, (units, n, 3, n)."""
+    """A change (units, n, 3) as n changes of a single dwell each, (units, n, 3, n)."""
     change = np.broadcast_to(change, shape)
     out = np.zeros((*shape, shape[1]))
     every = np.arange(shape[1])
@@ -114,10 +114,10 @@ def _noise(lot: LotArrays, left: Array, effects: Sequence[str]) -> Array:
     units = len(lot.units)
     scale = np.sqrt(np.mean(lot.standard_error**2, axis=1))
     common = np.mean(left, axis=0)
-    own = fitted_with_noise(replace(lot, output=lot.output - common, kinds=np.full_like(lot.kinds, DWELL)), effects)
+    fitted = fitted_with_noise(replace(lot, output=lot.output - common, kinds=np.full_like(lot.kinds, DWELL)), effects)
     time = np.broadcast_to(lot.state.time, lot.output.shape[:2])[0]
     flicker, walk = wander_kernels(time)
-    profile = np.moveaxis(lot.standard_error / scale[:, None, :], 1, -1) * own.white[..., None]
+    profile = np.moveaxis(lot.standard_error / scale[:, None, :], 1, -1) * fitted.white[..., None]
     total = profile[..., None] ** 2 * np.eye(time.size)
-    total = total + own.flicker[..., None, None] ** 2 * flicker + own.walk[..., None, None] ** 2 * walk
+    total = total + fitted.flicker[..., None, None] ** 2 * flicker + fitted.walk[..., None, None] ** 2 * walk
     return total * units / (units - 1.0)

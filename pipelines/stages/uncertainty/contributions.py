@@ -38,7 +38,7 @@ class UncertaintySource:
 
 
 def merged(station: Uncertainty | None, recipe: Uncertainty | None) -> Uncertainty | None:
-    """The station's statement with the recipe's entries in place of the same ones; None where neither states any."""
+    """The station's statement, with entries of the recipe replacing those of the same key; None where neither states any."""
     if station is None or recipe is None:
         return station or recipe
     grades = {station.grade_source, recipe.grade_source}
@@ -173,21 +173,21 @@ def _electrical(
 ) -> Iterator[tuple[str, Errors, float]]:
     if stated.supply is not None and stability is not None and stability.ratiometric > 0.0:
         yield "supply", Errors(gain=stability.ratiometric), stated.supply.standard().u
-    own = [(axis, float(scale)) for axis, scale in zip(at.state.axes, at.scale, strict=True)]
+    scales = [(axis, float(scale)) for axis, scale in zip(at.state.axes, at.scale, strict=True)]
     if stated.reader is not None:
         yield "reader_gain", Errors(gain=1.0), stated.reader.standard("gain").u
         for name, part in (("reader_offset", "offset"), ("reader_inl", "inl")):
-            for axis, scale in own:
+            for axis, scale in scales:
                 yield name, Errors(offset=_unit_vector(axis, scale)), stated.reader.standard(part).u
     rate = at.state.temperature_rate
     if stated.timing is not None and rate is not None:
         yield "timing", Errors(temperature=rate / 60.0), stated.timing.standard("wait").u
     if stated.timing is not None:
-        for axis, scale in own:
+        for axis, scale in scales:
             yield "creep", Errors(offset=_unit_vector(axis, scale)), stated.timing.standard("creep").u
     if stated.vibration is not None:
         u = 1e-6 * stated.vibration.coefficient_ug_g2 * stated.vibration.standard("rms").u ** 2
-        for axis, scale in own:
+        for axis, scale in scales:
             yield "vibration", Errors(offset=_unit_vector(axis, scale)), u
 
 

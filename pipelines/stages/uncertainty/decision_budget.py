@@ -30,7 +30,7 @@ class DecisionBudget:
 
     def __init__(self, tables: BudgetTables, terms: BudgetTerms) -> None:
         parts = [_PartBudget(part, terms) for part in tables.parts()]
-        self._parts = {unit: (part, place) for part in parts for place, unit in enumerate(part.units)}
+        self._parts = {unit: (part, index) for part in parts for index, unit in enumerate(part.units)}
         every = np.concatenate([part.covariance for part in parts])
         order = list(self._parts)
         self.covariance: Array = every[[order.index(unit) for unit in tables.calibrated().units]]
@@ -48,29 +48,31 @@ class _PartBudget:
         self.units = self._lot.calibration.units
         self._groups = groups_of(self._lot.variances)
         self._known: dict[str, dict[Key, list[BudgetRow]]] = {}
-        whole = symmetric(self._lot.variances.fit.covariance())
-        self.covariance: Array = np.broadcast_to(whole, (len(self.units), *whole.shape[-2:]))
+        covariance = symmetric(self._lot.variances.fit.covariance())
+        self.covariance: Array = np.broadcast_to(covariance, (len(self.units), *covariance.shape[-2:]))
 
     def rows(self, name: str) -> Mapping[Key, list[BudgetRow]]:
         """The quantities of the part of the budget with a name, for every unit in order; none for an unknown name."""
         part = PARTS.get(name, "")
         if part and part not in self._known:
             self._known[part] = {}
-            for one in part_of(part, self._lot, decisions=True):
-                parts = one.value, *combined(one, self._groups)
+            for quantity in part_of(part, self._lot, decisions=True):
+                parts = quantity.value, *combined(quantity, self._groups)
                 columns = (np.asarray(values, dtype=float).tolist() for values in parts)
-                self._known[part][one.name, one.axis] = [BudgetRow(*row) for row in zip(*columns, strict=True)]
+                self._known[part][quantity.name, quantity.axis] = [
+                    BudgetRow(*row) for row in zip(*columns, strict=True)
+                ]
         return self._known.get(part, {})
 
 
 class _UnitBudget(Mapping[Key, BudgetRow]):
-    """The quantities of the unit at a place of its part of the lot."""
+    """The quantities of the unit with this index in its part of the lot."""
 
-    def __init__(self, lot: _PartBudget, place: int) -> None:
-        self._lot, self._place = lot, place
+    def __init__(self, lot: _PartBudget, index: int) -> None:
+        self._lot, self._index = lot, index
 
     def __getitem__(self, key: Key) -> BudgetRow:
-        return self._lot.rows(key[0])[key][self._place]
+        return self._lot.rows(key[0])[key][self._index]
 
     def __iter__(self) -> Iterator[Key]:
         return iter(dict.fromkeys(key for name in PARTS for key in self._lot.rows(name)))

@@ -32,10 +32,10 @@ def lot_risks(figures: pd.DataFrame, limits: Limits, shared: Mapping[str, float]
     limited = np.flatnonzero(np.isfinite(numbers["limit"]))
     for name in dict.fromkeys(names[limited].tolist()):
         places = limited[names[limited] == name]
-        own = {column: values[places] for column, values in numbers.items()}
-        values = own["value"]
-        u = float(np.sqrt(np.mean((own["uncertainty"] / limits.coverage_factor) ** 2)))
-        limit, accept = float(own["limit"][0]), float(np.nanmean(own["accept"]))
+        columns = {column: values[places] for column, values in numbers.items()}
+        values = columns["value"]
+        u = float(np.sqrt(np.mean((columns["uncertainty"] / limits.coverage_factor) ** 2)))
+        limit, accept = float(columns["limit"][0]), float(np.nanmean(columns["accept"]))
         common = min(shared.get(str(name), 0.0), u)
         own_u = float(np.sqrt(u**2 - common**2))
         process = process_deviation(values.tolist(), own_u)
@@ -50,10 +50,10 @@ def lot_risks(figures: pd.DataFrame, limits: Limits, shared: Mapping[str, float]
                 "limit": limit,
                 "accept": accept,
                 **_risks(float(values.mean()), process, (own_u, common), limit, accept, len(values)),
-                "largest_pfa": float(np.fmax.reduce(own["pfa"])),
+                "largest_pfa": float(np.fmax.reduce(columns["pfa"])),
             }
         )
-    return pd.DataFrame(rows) if rows else empty_table(texts=TEXTS, whole="units", numbers=NUMBERS)
+    return pd.DataFrame(rows) if rows else empty_table(texts=TEXTS, integers="units", numbers=NUMBERS)
 
 
 def _risks(

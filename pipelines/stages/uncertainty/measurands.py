@@ -58,7 +58,7 @@ class VarianceParts:
 
 @dataclass(frozen=True)
 class LotBudget:
-    """What a budget is computed from: dwells, calibration, tables, statements, and the influences through the fit."""
+    """The inputs of a budget: dwells, calibration, tables, statements, and the influences through the fit."""
 
     lot: LotArrays
     calibration: Calibration
@@ -105,13 +105,13 @@ class BudgetQuantity:
     of_prior: Array | None = None
 
 
-def quantities_of(own: LotBudget) -> Iterator[BudgetQuantity]:
+def quantities_of(budget: LotBudget) -> Iterator[BudgetQuantity]:
     """Every quantity of a budget."""
     for part in dict.fromkeys(PARTS.values()):
-        yield from part_of(part, own)
+        yield from part_of(part, budget)
 
 
-def part_of(part: str, own: LotBudget, *, decisions: bool = False) -> Iterator[BudgetQuantity]:
+def part_of(part: str, budget: LotBudget, *, decisions: bool = False) -> Iterator[BudgetQuantity]:
     """The quantities of one part of a budget, a value of :data:`PARTS`.
 
     Parameters
@@ -119,22 +119,23 @@ def part_of(part: str, own: LotBudget, *, decisions: bool = False) -> Iterator[B
     decisions : whether the parts that a verification shows are left out where no decision depends on them
     """
     if part == "coefficients":
-        yield from _coefficients(own)
+        yield from _coefficients(budget)
     elif part == "angles":
-        yield from _angles(own)
+        yield from _angles(budget)
     elif part == "outputs":
-        yield from _outputs(own)
-    elif part == "verification" and len(own.tables.verification):
-        split = own.terms.stability is not None or not decisions  # the error over the period is made of the two parts
-        errors = list(_verification(own, split=split))
+        yield from _outputs(budget)
+    elif part == "verification" and len(budget.tables.verification):
+        # the error over the period is made of the two parts
+        split = budget.terms.stability is not None or not decisions
+        errors = list(_verification(budget, split=split))
         yield from errors
-        yield from _period(errors, own)
+        yield from _period(errors, budget)
 
 
-def _coefficients(own: LotBudget) -> Iterator[BudgetQuantity]:
-    calibration, scale = own.calibration, own.scale
+def _coefficients(budget: LotBudget) -> Iterator[BudgetQuantity]:
+    calibration, scale = budget.calibration, budget.scale
     spread = np.sqrt(np.diagonal(calibration.covariance, axis1=-2, axis2=-1))
-    prior = own.tables.prior
+    prior = budget.tables.prior
     shares = None
     if prior is not None and len(prior):
         shares = prior["share"].to_numpy(dtype=float).reshape(calibration.coefficients.shape)
@@ -144,15 +145,15 @@ def _coefficients(own: LotBudget) -> Iterator[BudgetQuantity]:
                 along = letter + calibration.names[axis][column][1][-1] if effect == "misalignment" else letter
                 factor = MICRO / scale[:, axis]
                 value = factor * calibration.coefficients[:, axis, column]
-                parts = factor[:, None] * own.variances.fit.coefficients[:, axis, column, :]
+                parts = factor[:, None] * budget.variances.fit.coefficients[:, axis, column, :]
                 noise, nominal = factor * spread[:, axis, column], MICRO if effect == "scale" else 0.0
                 share = None if shares is None else shares[:, axis, column]
-                yield BudgetQuantity(effect, along, unit, value - nominal, noise, parts, own.dof, of_prior=share)
+                yield BudgetQuantity(effect, along, unit, value - nominal, noise, parts, budget.dof, of_prior=share)
 
 
-def _angles(own: LotBudget) -> Iterator[BudgetQuantity]:
+def _angles(budget: LotBudget) -> Iterator[BudgetQuantity]:
     """Deviation from 90° of the angle between two axes, (m_ij + m_ji): independent of the seat."""
-    calibration, scale, changes = own.calibration, own.scale, own.variances.fit.coefficients
+    calibration, scale, changes = budget.calibration, budget.scale, budget.variances.fit.coefficients
     if "misalignment" not in calibration.effects or len(calibration.axes) < len(AXES):
         return
     noise = calibration.covariance
@@ -165,15 +166,17 @@ def _angles(own: LotBudget) -> Iterator[BudgetQuantity]:
         value = fi * calibration.coefficients[:, i, a] + fj * calibration.coefficients[:, j, b]
         parts = fi[:, None] * changes[:, i, a] + fj[:, None] * changes[:, j, b]
         u = np.sqrt((fi**2) * noise[:, i, a, a] + (fj**2) * noise[:, j, b, b])
-        yield BudgetQuantity("orthogonality", AXES[i] + AXES[j], "µrad", value, u, parts, own.dof)
+        yield BudgetQuantity("orthogonality", AXES[i] + AXES[j], "µrad", value, u, parts, budget.dof)
 
 
-def _outputs(own: LotBudget) -> Iterator[BudgetQuantity]:
+def _outputs(budget: LotBudget) -> Iterator[BudgetQuantity]:
     """Corrected output, worst force and temperature of the certified range."""
-    calibration, dof = own.calibration, own.dof
-    state = certified_range(own.lot, own.terms)
+    calibration, dof = budget.calibration, budget.dof
+    state = certified_range(budget.lot, budget.terms)
     columns = design.local_columns(design.split(calibration.effects)[0], state, calibration.nonlinear)
-    errors = own.variances.fit.user_errors(columns, state.force, intrinsic=own.terms.certificate.frame == "intrinsic")
+    errors = budget.variances.fit.user_errors(
+        columns, state.force, intrinsic=budget.terms.certificate.frame == "intrinsic"
+    )
     noise = output_noise(calibration, columns)
     zero = np.zeros_like(dof)
     for axis, letter in enumerate(calibration.letters):
@@ -189,15 +192,15 @@ def output_noise(calibration: Calibration, columns: Array) -> Array:
     """Covariance of the corrected output by the noise of the fit, (units, m, k, k), µg², of the k axes with an output."""
     axes = calibration.axes
     inverse = np.linalg.inv(design.of_axes(design.of_axes(calibration.response, axes, -1), axes, -2))
-    own = np.swapaxes(np.sum(np.matmul(columns, calibration.covariance) * columns, axis=-1), -1, -2)
-    return MICRO**2 * np.einsum("uij,umj,ukj->umik", inverse, own, inverse)
+    variance = np.swapaxes(np.sum(np.matmul(columns, calibration.covariance) * columns, axis=-1), -1, -2)
+    return MICRO**2 * np.einsum("uij,umj,ukj->umik", inverse, variance, inverse)
 
 
 def _worst(name: str, axis: str, errors: Array, variance: Array, value: Array, dof: Array) -> BudgetQuantity:
     """The quantity at the condition where its variance is largest, by unit; errors (units, m, q), g, variance (units, m), µg²."""
     errors = np.broadcast_to(errors, (value.size, *errors.shape[-2:]))
-    whole = MICRO**2 * np.einsum("umq,umq->um", errors, errors) + variance
-    where = np.argmax(whole, axis=-1)
+    total = MICRO**2 * np.einsum("umq,umq->um", errors, errors) + variance
+    where = np.argmax(total, axis=-1)
     rows = np.arange(value.size)
     return BudgetQuantity(name, axis, "µg", value, np.sqrt(variance[rows, where]), MICRO * errors[rows, where], dof)
 
@@ -235,47 +238,47 @@ def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
     )
 
 
-def _verification(whole: LotBudget, *, split: bool) -> Iterator[BudgetQuantity]:
+def _verification(budget: LotBudget, *, split: bool) -> Iterator[BudgetQuantity]:
     """RMS error of each axis for the user, and the magnitude at its worst pose.
 
     Parameters
     ----------
     split : whether the part that the station's own verification shows, and that which it cannot, are computed
     """
-    lot, calibration, variances = whole.lot, whole.calibration, whole.variances
+    lot, calibration, variances = budget.lot, budget.calibration, budget.variances
     unseen = lot.of_kind("verification")
     columns = design.local_columns(design.split(calibration.effects)[0], lot.state, calibration.nonlinear)
     columns = columns[..., unseen, :]
     force = np.broadcast_to(lot.state.force, (*lot.output.shape[:1], *lot.state.force.shape[-2:]))[:, unseen]
-    intrinsic = whole.terms.certificate.frame == "intrinsic"
+    intrinsic = budget.terms.certificate.frame == "intrinsic"
     true = MICRO * variances.fit.user_errors(columns, force, intrinsic=intrinsic)
     shown = MICRO * variances.fit.shown_errors(columns, variances.verification) if split else None
     hidden = variances.visible < UNSEEN if split else None
-    rows = whole.tables.verification
+    rows = budget.tables.verification
     for axis, letter in enumerate(calibration.letters):
-        own = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
+        pose_errors = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
         noise, expected, freedom = (
             rows[name.format(letter)].to_numpy().reshape(len(lot.units), -1)[:, 0] for name in OF_UNITS
         )
         parts = np.sqrt(np.mean(true[..., axis, :] ** 2, axis=-2))
         parts = np.broadcast_to(parts, (len(lot.units), parts.shape[-1]))
-        value = np.sqrt(np.mean(own**2, axis=1))
-        one = BudgetQuantity("bias_error", letter, "µg", value, noise, parts, whole.dof)
+        value = np.sqrt(np.mean(pose_errors**2, axis=1))
+        quantity = BudgetQuantity("bias_error", letter, "µg", value, noise, parts, budget.dof)
         if shown is not None and hidden is not None:
             seen, unshown = (
                 _all(rms_over(part), lot) for part in (shown[..., axis, :], true[..., axis, :][..., hidden])
             )
             # the RMS of the run has in it what the verification shows of the references
-            fixed = np.sqrt(np.maximum(np.sum(one.parts**2, axis=-1) - seen**2, unshown**2))
+            fixed = np.sqrt(np.maximum(np.sum(quantity.parts**2, axis=-1) - seen**2, unshown**2))
             flat = true[..., axis, :].reshape(-1, true.shape[-1])
-            errors = AxisErrors(one.value, expected, freedom, own.mean(axis=1), fixed, flat.T @ flat)
-            one = replace(one, shown=seen, unseen=unshown, axis_errors=errors)
-        yield one
+            errors = AxisErrors(quantity.value, expected, freedom, pose_errors.mean(axis=1), fixed, flat.T @ flat)
+            quantity = replace(quantity, shown=seen, unseen=unshown, axis_errors=errors)
+        yield quantity
     seen_force = design.of_axes(force, calibration.axes, -1)
     along = norm_errors(true / MICRO, seen_force)
-    value, noise = _worst_pose(lot, whole.tables)
+    value, noise = _worst_pose(lot, budget.tables)
     variance = np.zeros(along.shape[:-1]) + noise[:, None] ** 2
-    worst = _worst("verification_norm", "norm", along, variance, value, whole.dof)
+    worst = _worst("verification_norm", "norm", along, variance, value, budget.dof)
     if shown is None or hidden is None:
         yield worst
         return
@@ -291,11 +294,11 @@ def _worst_pose(lot: LotArrays, tables: BudgetTables) -> tuple[Array, Array]:
     """Magnitude of the largest error of a pose and its uncertainty by noise, of every unit, µg."""
     rows = ByUnit(tables.verification_poses)
     largest = np.zeros((2, len(lot.units)))
-    for place, unit in enumerate(lot.units):
-        own = rows.of(unit)
-        error, u = own["error_ug"], own["uncertainty_ug"]
+    for index, unit in enumerate(lot.units):
+        poses = rows.of(unit)
+        error, u = poses["error_ug"], poses["uncertainty_ug"]
         worst = int(np.argmax(np.abs(error)))
-        largest[:, place] = abs(error[worst]), u[worst]
+        largest[:, index] = abs(error[worst]), u[worst]
     return largest[0], largest[1]
 
 
@@ -303,25 +306,25 @@ def _all(values: Array, lot: LotArrays) -> Array:
     return np.broadcast_to(values, (len(lot.units),)).copy()
 
 
-def _period(errors: list[BudgetQuantity], own: LotBudget) -> Iterator[BudgetQuantity]:
+def _period(errors: list[BudgetQuantity], budget: LotBudget) -> Iterator[BudgetQuantity]:
     """RMS error over the period of validity of each axis, and the largest; none if nothing is stated for the time after."""
-    lot, tables, terms = own.lot, own.tables, own.terms
+    lot, tables, terms = budget.lot, budget.tables, budget.terms
     used = lot.of_kind("dwell")
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[:, used]
     span = float(np.ptp(time[0])) + terms.dwell_s
     axes: list[AxisErrors] = []
     for letter in lot.letters:
         of_run = next(q for q in errors if q.name == "bias_error" and q.axis == letter).axis_errors
-        whole = [one for unit in lot.units if (one := period_of(tables, terms, unit, letter, span)) is not None]
-        if len(whole) != len(lot.units) or of_run is None:
+        growths = [growth for unit in lot.units if (growth := period_of(tables, terms, unit, letter, span)) is not None]
+        if len(growths) != len(lot.units) or of_run is None:
             return
-        names = dict.fromkeys(name for one in whole for name in one)
-        later = {name: np.array([one.get(name, 0.0) for one in whole]) for name in names}
+        names = dict.fromkeys(name for growth in growths for name in growth)
+        later = {name: np.array([growth.get(name, 0.0) for growth in growths]) for name in names}
         axes.append(replace(of_run, later=later))
     zero, none = np.zeros(len(lot.units)), np.zeros((len(lot.units), 0))
     by_axis = [{"run": axis.run, "budget": axis.fixed, **axis.later} for axis in axes]
     for letter, axis, parts in zip(lot.letters, axes, by_axis, strict=True):
-        yield BudgetQuantity("bias_error_period", letter, "µg", axis.value, zero, none, own.dof, extra=parts)
+        yield BudgetQuantity("bias_error_period", letter, "µg", axis.value, zero, none, budget.dof, extra=parts)
     # of the largest error the parts are those of the axis that is expected to be the worst
     worst = np.argmax([axis.value for axis in axes], axis=0)
     names = dict.fromkeys(name for parts in by_axis for name in parts)
@@ -329,4 +332,4 @@ def _period(errors: list[BudgetQuantity], own: LotBudget) -> Iterator[BudgetQuan
         name: np.stack([parts.get(name, zero) for parts in by_axis])[worst, np.arange(zero.size)] for name in names
     }
     for name, value in zip((MEDIAN, BOUND), largest_error(axes, terms.switch_on_dof), strict=True):
-        yield BudgetQuantity(LARGEST_ERROR, name, "µg", value, zero, none, own.dof, extra=extra)
+        yield BudgetQuantity(LARGEST_ERROR, name, "µg", value, zero, none, budget.dof, extra=extra)

@@ -29,7 +29,7 @@ _TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True)
 class AxisErrors:
-    """What makes the error of one axis in a use, (units,) each where not said otherwise; µg.
+    """The parts of the error of one axis in a use, (units,) each where not said otherwise; µg.
 
     run, mean : RMS and mean of the errors of the verification
     expected, dof : RMS of a correct model, and degrees of freedom of its square
@@ -64,9 +64,9 @@ def largest_error(axes: list[AxisErrors], switch_on_dof: float) -> tuple[Array, 
     influences = ndtri(uniform[:, :q])
     out = np.zeros((2, units))
     forms = [_form(axis, influences) for axis in axes]
-    own = [uniform[:, q + OF_AXIS * k : q + OF_AXIS * (k + 1)] for k in range(len(axes))]
-    normal = [ndtri(columns) for columns in own]
-    again = [stdtrit(switch_on_dof, columns[:, 2]) for columns in own]
+    draws = [uniform[:, q + OF_AXIS * k : q + OF_AXIS * (k + 1)] for k in range(len(axes))]
+    normal = [ndtri(columns) for columns in draws]
+    again = [stdtrit(switch_on_dof, columns[:, 2]) for columns in draws]
     for unit in range(units):
         largest = np.zeros(DRAWS)
         for axis, form, z, switched in zip(axes, forms, normal, again, strict=True):
@@ -87,7 +87,7 @@ def _square(axis: AxisErrors, unit: int, form: Array, z: Array, switched: Array)
 
 
 def _form(axis: AxisErrors, influences: Array) -> Array:
-    """Draws of the square of what the references make, of mean one."""
+    """Draws of the squared error by the references, of mean 1."""
     trace = float(np.trace(axis.form))
     if not trace > 0.0:
         return np.ones(len(influences))
@@ -102,7 +102,7 @@ def _chi_squared(dof: float, z: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def _uniform(count: int) -> Array:
-    """The same well-spread draws every time: a decision that is made again is the same."""
+    """Well-spread draws from a fixed seed, so that a repeated decision is identical."""
     draws = qmc.Sobol(count, scramble=True, rng=np.random.default_rng(20260101)).random(DRAWS)
     return np.clip(draws, 1e-9, 1.0 - 1e-9)
 
@@ -175,17 +175,17 @@ def ageing_u(ageing: Ageing, windows: Windows) -> float:
 
 
 def instability_of(tables: BudgetTables, unit: str, axis: str) -> float:
-    """Bias instability B, µg: of the static record, its upper limit where it is not identified; without one that of the fit."""
+    """Bias instability B, µg: of the static record, its upper limit where it is not identified; of the fit without a record."""
     shown, _ = _of_record(tables.noise, unit, axis, "B")
     return shown if np.isfinite(shown) else _of_fit(tables.wander, unit, axis, "bias_instability_ug")
 
 
 def _of_record(noise: pd.DataFrame, unit: str, axis: str, term: str) -> tuple[float, bool]:
     """A term of the static record, else its upper limit, and whether it is identified; nan without a record."""
-    own = noise[(noise["unit"] == unit) & (noise["axis"] == axis) & (noise["term"] == term)] if len(noise) else noise
-    if not len(own):
+    terms = noise[(noise["unit"] == unit) & (noise["axis"] == axis) & (noise["term"] == term)] if len(noise) else noise
+    if not len(terms):
         return float("nan"), False
-    first = own.iloc[0]
+    first = terms.iloc[0]
     identified = bool(first["identified"])
     return float(first["value"] if identified else first["high"]), identified
 
@@ -193,5 +193,5 @@ def _of_record(noise: pd.DataFrame, unit: str, axis: str, term: str) -> tuple[fl
 def _of_fit(wander: pd.DataFrame, unit: str, axis: str, name: str) -> float:
     if name not in wander:
         return float("nan")
-    own = wander[(wander["unit"] == unit) & (wander["axis"] == axis)]
-    return float(own[name].iloc[0]) if len(own) else float("nan")
+    rows = wander[(wander["unit"] == unit) & (wander["axis"] == axis)]
+    return float(rows[name].iloc[0]) if len(rows) else float("nan")

@@ -73,8 +73,8 @@ class Reach:
     @property
     def shares(self) -> dict[str, float]:
         """Share of each contribution in the sum of their squares, the largest first."""
-        whole = sum(part**2 for part in self.parts.values())
-        shares = {name: part**2 / whole for name, part in self.parts.items()} if whole > 0.0 else {}
+        variance = sum(part**2 for part in self.parts.values())
+        shares = {name: part**2 / variance for name, part in self.parts.items()} if variance > 0.0 else {}
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
@@ -100,8 +100,8 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     for effect, unit in EFFECTS.items():
         for axis, letter in enumerate(AXES[k] for k in axes):
             for column in [k for k, (name, _) in enumerate(fit.names[axis]) if name == effect]:
-                own = float(np.sqrt(noise[axis, column, column]))
-                out.append(_reach(effect, letter, unit, own, propagation.coefficients[axis, column], names))
+                noise_u = float(np.sqrt(noise[axis, column, column]))
+                out.append(_reach(effect, letter, unit, noise_u, propagation.coefficients[axis, column], names))
     if planned.verification is not None:
         out += _errors(planned, terms, nominal, propagation, names, fit)
     return out
@@ -112,7 +112,7 @@ def _nominal(effects: Sequence[str], state: State, zero_level_g: float) -> Measu
     sensor, station = design.split(effects)
     values = design.starting_values([*sensor, *station], state)
     names = [design.local_names(sensor, axis, values) for axis in state.axes]
-    coefficients = np.array([[usual.get(effect, 0.0) for effect, _ in own] for own in names])
+    coefficients = np.array([[usual.get(effect, 0.0) for effect, _ in terms] for terms in names])
     return MeasurementModel(tuple(effects), coefficients, values)
 
 
@@ -147,19 +147,21 @@ def _errors(
     if later is not None:
         later = {name: value for name, value in later.items() if value > 0.0}
     for axis, letter in enumerate(AXES[k] for k in state.axes):
-        own = errors[..., axis, :]
-        parts = {group: MICRO * float(rms_over(own[..., names == group])) for group in dict.fromkeys(names.tolist())}
+        changes = errors[..., axis, :]
+        parts = {
+            group: MICRO * float(rms_over(changes[..., names == group])) for group in dict.fromkeys(names.tolist())
+        }
         u = _combined(parts)
         out.append(Reach("bias_error", letter, "µg", u, parts))
         if later is not None:
-            whole = {"run": planned.run_ug, "budget": u, **later}
-            out.append(Reach("bias_error_period", letter, "µg", _combined(whole), whole))
-            flat = own.reshape(-1, own.shape[-1])
+            over_period = {"run": planned.run_ug, "budget": u, **later}
+            out.append(Reach("bias_error_period", letter, "µg", _combined(over_period), over_period))
+            flat = changes.reshape(-1, changes.shape[-1])
             run, fixed, dof = (np.array([value]) for value in (planned.run_ug, u, float(len(state.force))))
             after = {name: np.array([value]) for name, value in later.items()}
             axes.append(AxisErrors(run, run, dof, 0.0 * run, fixed, flat.T @ flat, after))
     if axes:
-        worst = max((one for one in out if one.quantity == "bias_error_period"), key=lambda one: one.u)
+        worst = max((reach for reach in out if reach.quantity == "bias_error_period"), key=lambda reach: reach.u)
         _, bound = largest_error(axes, terms.switch_on_dof)
         out.append(Reach(LARGEST_ERROR, BOUND, "µg", float(bound[0]), worst.parts))
     noise = {} if planned.joint is None else {"noise": _noise_of_pose(planned.joint, columns, fit, state)}
@@ -205,18 +207,18 @@ def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[s
     out: list[str] = []
     worst = {q: max((r for r in reaches if r.quantity == q), key=lambda r: r.u, default=None) for q in FIGURES}
     for quantity, (figure, factor) in FIGURES.items():
-        one = worst[quantity]
+        reach = worst[quantity]
         needed = limits.figures[figure].max if figure in limits.figures else None
         if quantity == LARGEST_ERROR:
             needed = min((limit for limit in (needed, GRADES.get(limits.grade)) if limit is not None), default=None)
-        if one is None or needed is None:
+        if reach is None or needed is None:
             continue
         period = quantity == LARGEST_ERROR
-        reached = factor * (one.u if period else limits.coverage_factor * one.u)
+        reached = factor * (reach.u if period else limits.coverage_factor * reach.u)
         if reached > needed:
-            unit = limits.figures[figure].unit if figure in limits.figures else one.unit
+            unit = limits.figures[figure].unit if figure in limits.figures else reach.unit
             what = f"expected over {months} months" if period else f"U (k = {limits.coverage_factor:g})"
-            shares = [(name, share) for name, share in one.shares.items() if share >= LEAST_SHARE][:3]
+            shares = [(name, share) for name, share in reach.shares.items() if share >= LEAST_SHARE][:3]
             rulers = ", ".join(f"{LABELS[name]} {100.0 * share:.0f} %" for name, share in shares)
             out.append(f"{figure}: limit {shown(needed)} {unit}, {what} {shown(reached)} {unit} ({rulers})")
     return out
@@ -224,17 +226,17 @@ def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[s
 
 def at_risk(reaches: Sequence[Reach], limits: Limits) -> list[str]:
     """The limit of a pose of verification that noise alone makes good units miss, a sentence; it can be met."""
-    figure, one = "verification_norm_ug", next((r for r in reaches if r.quantity == "verification_norm"), None)
+    figure, reach = "verification_norm_ug", next((r for r in reaches if r.quantity == "verification_norm"), None)
     limit = limits.figures[figure].max if figure in limits.figures else None
-    if one is None or limit is None:
+    if reach is None or limit is None:
         return []
-    expanded = limits.guard_factor * one.u
-    noise = one.parts.get("noise", 0.0)
+    expanded = limits.guard_factor * reach.u
+    noise = reach.parts.get("noise", 0.0)
     if not 0.0 < limit - expanded < LEAST_MARGIN * noise:
         return []
     share, k = 2.0 * ndtr(-(limit - expanded) / noise), limits.coverage_factor
     text = (
-        f"{figure}: limit {shown(limit)} µg, U (k = {k:g}) {shown(k * one.u)} µg; by noise alone {100.0 * share:.0f} % of good "
+        f"{figure}: limit {shown(limit)} µg, U (k = {k:g}) {shown(k * reach.u)} µg; by noise alone {100.0 * share:.0f} % of good "
         "units or more fail; add soaks, poses of the fit or repetitions of the verification"
     )
     return [text]

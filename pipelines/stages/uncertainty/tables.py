@@ -72,7 +72,7 @@ def empty() -> dict[str, pd.DataFrame]:
     return {
         "budget": empty_table(texts=TEXTS, numbers=NUMBERS),
         "uncertainties": empty_table(texts=SUM_TEXTS, numbers=SUM_NUMBERS),
-        "budget_covariance": empty_table(texts="unit", whole="row column", numbers="value"),
+        "budget_covariance": empty_table(texts="unit", integers="row column", numbers="value"),
     }
 
 
@@ -102,7 +102,7 @@ def tables_of(
     left_out : quantities by name and axis that are none of this lot
     """
     units, places = lot.calibration.units, groups_of(lot.variances)
-    quantities = [one for one in quantities_of(lot) if (one.name, one.axis) not in left_out]
+    quantities = [quantity for quantity in quantities_of(lot) if (quantity.name, quantity.axis) not in left_out]
     parts = [_contributions(quantity, places, lot.variances, known, lot.terms) for quantity in quantities]
     return {
         "budget": _budget_rows(units, quantities, parts),
@@ -120,7 +120,7 @@ def has_uncertainty(row: Mapping[str, Any]) -> bool:
 
 
 def groups_of(variances: VarianceParts) -> dict[str, Places]:
-    """The places among the influences of every contribution, in order."""
+    """Indices of the influences that make up each contribution, in order."""
     names = np.array(variances.fit.source.contributions, dtype=object)
     return {group: np.flatnonzero(names == group) for group in dict.fromkeys(names.tolist())}
 
@@ -143,11 +143,11 @@ def _contributions(
     known: Mapping[str, UncertaintySource],
     terms: BudgetTerms,
 ) -> _Contributions:
-    own = _parts(quantity, places)
-    u = np.ascontiguousarray(np.stack(list(own.values()), axis=1))
+    uncertainties = _parts(quantity, places)
+    u = np.ascontiguousarray(np.stack(list(uncertainties.values()), axis=1))
     stated, dof, sensitivity = u.copy(), np.full(u.shape, np.inf), np.full(u.shape, np.nan)
     about: dict[str, list[Any]] = {name: [] for name in SAME}
-    for column, name in enumerate(own):
+    for column, name in enumerate(uncertainties):
         if name in {NOISE, PRIOR} or name in BEYOND:
             row = _beyond(name, terms)
             if name in {NOISE, "run"}:
@@ -160,7 +160,7 @@ def _contributions(
                 sensitivity[:, column] = u[:, column] / single
         for key in SAME:
             about[key].append(row[key])
-    return _Contributions(list(own), u, about, stated, dof, sensitivity)
+    return _Contributions(list(uncertainties), u, about, stated, dof, sensitivity)
 
 
 def _parts(quantity: BudgetQuantity, places: Mapping[str, Places]) -> dict[str, Array]:
@@ -170,8 +170,8 @@ def _parts(quantity: BudgetQuantity, places: Mapping[str, Places]) -> dict[str, 
     out = {NOISE: np.asarray(quantity.noise, dtype=float)}
     if quantity.of_prior is not None:
         out |= {NOISE: out[NOISE] * np.sqrt(1.0 - quantity.of_prior), PRIOR: out[NOISE] * np.sqrt(quantity.of_prior)}
-    for group, own in places.items():
-        out[group] = np.sqrt(np.sum(np.ascontiguousarray(quantity.parts[:, own]) ** 2, axis=1))
+    for group, columns in places.items():
+        out[group] = np.sqrt(np.sum(np.ascontiguousarray(quantity.parts[:, columns]) ** 2, axis=1))
     return out
 
 
@@ -203,7 +203,7 @@ def _referred(source: UncertaintySource, shares: Array) -> dict[str, Any]:
 
 
 def source_of(entry: Entry) -> str:
-    """What an entry rests on: a reference standard, or its source."""
+    """The origin of an entry: its reference standard, or its source."""
     return f"reference {entry.reference}" if entry.reference else entry.origin
 
 
@@ -224,27 +224,31 @@ def _summed(values: Array) -> Array:
 def _budget_rows(
     units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions]
 ) -> pd.DataFrame:
-    rows = [(one, name) for one, own in zip(quantities, parts, strict=True) for name in own.names]
-    about = {name: [value for own in parts for value in own.about[name]] for name in SAME}
+    rows = [
+        (quantity, name)
+        for quantity, contributions in zip(quantities, parts, strict=True)
+        for name in contributions.names
+    ]
+    about = {name: [value for contributions in parts for value in contributions.about[name]] for name in SAME}
 
     def together(of: Callable[[_Contributions], Array]) -> Array:
-        return np.concatenate([of(own) for own in parts], axis=1).ravel() if parts else np.empty(0)
+        return np.concatenate([of(contributions) for contributions in parts], axis=1).ravel() if parts else np.empty(0)
 
     return pd.DataFrame(
         {
             "unit": [unit for unit in units for _ in rows],
-            "quantity": [one.name for one, _ in rows] * len(units),
-            "axis": [one.axis for one, _ in rows] * len(units),
-            "unit_text": [one.unit for one, _ in rows] * len(units),
+            "quantity": [quantity.name for quantity, _ in rows] * len(units),
+            "axis": [quantity.axis for quantity, _ in rows] * len(units),
+            "unit_text": [quantity.unit for quantity, _ in rows] * len(units),
             "contribution": [name for _, name in rows] * len(units),
-            "u": together(lambda own: own.u),
+            "u": together(lambda contributions: contributions.u),
             "visible": about["visible"] * len(units),
-            "sensitivity": together(lambda own: own.sensitivity),
+            "sensitivity": together(lambda contributions: contributions.sensitivity),
             **{name: about[name] * len(units) for name in (*SAME[1:-2], "divisor")},
-            "stated": together(lambda own: own.stated),
-            "dof": together(lambda own: own.dof),
+            "stated": together(lambda contributions: contributions.stated),
+            "dof": together(lambda contributions: contributions.dof),
             "source": about["source"] * len(units),
-            "share": together(lambda own: _share(own.u)),
+            "share": together(lambda contributions: _share(contributions.u)),
         }
     )
 
@@ -259,36 +263,36 @@ def _sum_rows(
     """Every quantity with its combined and expanded uncertainty."""
     columns: dict[str, list[Array]] = {name: [] for name in SUM_NUMBERS.split()}
     largest: list[list[str]] = []
-    for one, own in zip(quantities, parts, strict=True):
-        a, b, u = combined(one, places)
+    for quantity, contributions in zip(quantities, parts, strict=True):
+        a, b, u = combined(quantity, places)
         none = np.full_like(a, np.nan)
-        dof = none if one.extra else effective_degrees(own.u, own.dof)
-        k = none if one.extra else coverage_factors(dof)
-        row = {"value": one.value, "u_a": a, "u_b": b, "u": u, "dof": dof, "k": k, "expanded": k * u,
-               "shown": none if one.shown is None else one.shown,
-               "unseen": none if one.unseen is None else one.unseen}  # fmt: skip
+        dof = none if quantity.extra else effective_degrees(contributions.u, contributions.dof)
+        k = none if quantity.extra else coverage_factors(dof)
+        row = {"value": quantity.value, "u_a": a, "u_b": b, "u": u, "dof": dof, "k": k, "expanded": k * u,
+               "shown": none if quantity.shown is None else quantity.shown,
+               "unseen": none if quantity.unseen is None else quantity.unseen}  # fmt: skip
         for name, values in row.items():
             columns[name].append(np.asarray(values, dtype=float))
-        largest.append(_largest(own))
+        largest.append(_largest(contributions))
     many, count = len(units), len(quantities)
     numbers = {name: np.stack(values, axis=1).ravel() if values else np.empty(0) for name, values in columns.items()}
     return pd.DataFrame(
         {
             "unit": [unit for unit in units for _ in range(count)],
             "quantity": [quantity.name for quantity in quantities] * many,
-            "axis": [one.axis for one in quantities] * many,
-            "unit_text": [one.unit for one in quantities] * many,
+            "axis": [quantity.axis for quantity in quantities] * many,
+            "unit_text": [quantity.unit for quantity in quantities] * many,
             **numbers,
-            "largest": [own[unit] for unit in range(many) for own in largest],
+            "largest": [texts[unit] for unit in range(many) for texts in largest],
             "frame": [terms.certificate.frame] * (many * count),
         }
     )
 
 
-def _largest(own: _Contributions) -> list[str]:
+def _largest(contributions: _Contributions) -> list[str]:
     """The three largest contributions of every unit with their shares, as text."""
-    order, share = np.argsort(-own.u, axis=1, kind="stable")[:, :3], _share(own.u)
-    labels = [LABELS[name] for name in own.names]
+    order, share = np.argsort(-contributions.u, axis=1, kind="stable")[:, :3], _share(contributions.u)
+    labels = [LABELS[name] for name in contributions.names]
     return [
         ", ".join(f"{labels[c]} {100.0 * share[unit, c]:.0f} %" for c in chosen if share[unit, c] > 0.0)
         for unit, chosen in enumerate(order.tolist())

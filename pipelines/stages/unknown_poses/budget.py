@@ -27,29 +27,31 @@ def norm_budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFr
     if terms.stated is None or tables.coefficients.empty:
         return empty()
     stated = terms.stated.model_copy(update=dict.fromkeys(OF_POSES))
-    own = [
+    parts = [
         tables_of(_of_unit(dwell, tables, replace(terms, stated=stated), stated), sources(stated), ROTATIONS)
         for dwell in norm_dwells(tables.dwells, tables.history, tables.coefficients, tables.covariance, tables.wander)
     ]
-    return {name: pd.concat([part[name] for part in own], ignore_index=True) for name in own[0]}
+    return {name: pd.concat([part[name] for part in parts], ignore_index=True) for name in parts[0]}
 
 
-def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty) -> LotBudget:
-    unit = one.lot.units[0]
-    state = one.lot.state
+def _of_unit(dwells: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty) -> LotBudget:
+    unit = dwells.lot.units[0]
+    state = dwells.lot.state
     outer, inner = angles_from_force(state.force)
     if state.temperature is None:
         state = replace(state, temperature=np.full(state.force.shape[:-1], terms.room_C), memory={})
-    lot = replace(one.lot, state=replace(state, outer=outer, inner=inner, memory={}))
-    at = conditions(lot, tables.dwells.assign(unit=tables.dwells["unit"].astype(str)), one.calibration.response, terms)
-    physical = with_device_temperature(one.model, one.calibration.response, terms.stability)
-    own, scattered = influences(stated, at, terms.stability)
-    whole = sensitivity(physical, lot.state, own, scattered)
-    fitted = propagated_by_norm(one.design, whole, one.calibration.response)
+    lot = replace(dwells.lot, state=replace(state, outer=outer, inner=inner, memory={}))
+    at = conditions(
+        lot, tables.dwells.assign(unit=tables.dwells["unit"].astype(str)), dwells.calibration.response, terms
+    )
+    physical = with_device_temperature(dwells.model, dwells.calibration.response, terms.stability)
+    inputs, scattered = influences(stated, at, terms.stability)
+    source = sensitivity(physical, lot.state, inputs, scattered)
+    fitted = propagated_by_norm(dwells.design, source, dwells.calibration.response)
     variances = VarianceParts(
-        fit=replace(fitted, source=replace(whole, changes=whole.changes[:, one.design.used])),
-        verification=whole.changes[:, ~one.design.used],
-        visible_share=lambda: one.design.visible_share(whole.changes[0]),
+        fit=replace(fitted, source=replace(source, changes=source.changes[:, dwells.design.used])),
+        verification=source.changes[:, ~dwells.design.used],
+        visible_share=lambda: dwells.design.visible_share(source.changes[0]),
     )
     wander = _of(tables.wander, unit)
     part = replace(
@@ -59,7 +61,7 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
         verification_poses=_of(tables.verification_poses, unit),
         noise=_of(tables.noise, unit),
     )
-    return LotBudget(lot, one.calibration, part, terms, variances)
+    return LotBudget(lot, dwells.calibration, part, terms, variances)
 
 
 def _of(table: pd.DataFrame, unit: str) -> pd.DataFrame:

@@ -153,7 +153,7 @@ def plausible_noises(model: Model, runs: Array) -> Iterator[PlausibleNoise]:
         return
     eye = np.broadcast_to(np.eye(problem.n), (problem.blocks, problem.n, problem.n))
     time, white = problem.lot.state.time, problem.covariance.white
-    kernels = np.stack([flicker_kernel(own) for own in time]), np.stack([walk_kernel(own) for own in time])
+    kernels = np.stack([flicker_kernel(times) for times in time]), np.stack([walk_kernel(times) for times in time])
     for shares, weight in model.plausible_shares():
         square = model.noise_at(shares).scale[:, None, None] ** 2
         slow = white * (shares.flicker * kernels[0] + shares.walk * kernels[1])
@@ -178,7 +178,7 @@ def norm_tables(done: FittedNorms, dwells: pd.DataFrame) -> dict[str, pd.DataFra
         ),
         "covariance": covariance_rows(done.measured.units, fit.fit.covariance),
         "residuals": _residual_rows(done, dwells),
-        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
+        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", integers="dwell other"),
         "wander": _wander_rows(done),
     }
 
@@ -233,9 +233,9 @@ def bias_uncertainty(done: FittedNorms) -> dict[str, Array]:
     The flicker of a diagnosis has time constants to four times the record. Scatter that the samples of the dwells do not show
     counts as flicker: few dwells do not show its kind.
     """
-    place = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
+    bias = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
     errors = np.sqrt(np.diagonal(done.fit.fit.covariance, axis1=-2, axis2=-1))
-    record = np.stack([errors[:, axis, k] for axis, k in enumerate(place)], axis=1)
+    record = np.stack([errors[:, axis, k] for axis, k in enumerate(bias)], axis=1)
     record = MICRO * (record if done.fit.record is None else done.fit.record) / done.scale
     lot = done.model.problem.lot
     known = done.model.problem.covariance.level if lot.recorded else done.white

@@ -53,19 +53,19 @@ def norm_dwells(
 ) -> Iterator[NormDwells]:
     """Every unit of a lot that has coefficients; the dwells of the fit and those that are held out together."""
     calibration = read_calibration(coefficients, covariance)
-    for place, unit in enumerate(calibration.units):
-        own = dwells[(dwells["unit"].astype(str) == unit) & dwells["kind"].isin(list(KINDS))]
+    for index, unit in enumerate(calibration.units):
+        rows = dwells[(dwells["unit"].astype(str) == unit) & dwells["kind"].isin(list(KINDS))]
         past = history if history is None or "unit" not in history.columns else history[history["unit"] == unit]
-        one = replace(
+        of_unit = replace(
             calibration,
             units=(unit,),
-            coefficients=calibration.coefficients[[place]],
-            covariance=calibration.covariance[[place]],
+            coefficients=calibration.coefficients[[index]],
+            covariance=calibration.covariance[[index]],
         )
-        yield _one(own.sort_values("dwell"), past, one, wander[wander["unit"].astype(str) == unit])
+        yield _norm_dwells(rows.sort_values("dwell"), past, of_unit, wander[wander["unit"].astype(str) == unit])
 
 
-def _one(
+def _norm_dwells(
     dwells: pd.DataFrame, history: pd.DataFrame | None, calibration: Calibration, wander: pd.DataFrame
 ) -> NormDwells:
     measurement = measured(dwells, history)
@@ -129,17 +129,17 @@ def verify_norms(
         return nothing_verified()
     units = list(norm_dwells(dwells, history, coefficients, covariance, wander))
     dof = wander.drop_duplicates("unit")["dof"].astype(int).tolist()
-    tables = [_verified(one, gravity, student(own)) for one, own in zip(units, dof, strict=True)]
-    return {name: pd.concat([own[name] for own in tables], ignore_index=True) for name in tables[0]}
+    tables = [_verified(unit, gravity, student(freedom)) for unit, freedom in zip(units, dof, strict=True)]
+    return {name: pd.concat([by_name[name] for by_name in tables], ignore_index=True) for name in tables[0]}
 
 
-def _verified(one: NormDwells, gravity: float, widened: float) -> dict[str, pd.DataFrame]:
+def _verified(unit: NormDwells, gravity: float, widened: float) -> dict[str, pd.DataFrame]:
     """The tables of one unit."""
-    unseen = ~one.design.used
-    force = one.lot.state.force[0, unseen]
+    unseen = ~unit.design.used
+    force = unit.lot.state.force[0, unseen]
     norm = np.linalg.norm(force, axis=1)
     error = MICRO * (norm - gravity)
-    expected = MICRO**2 * widened**2 * one.design.prediction(one.noise)
+    expected = MICRO**2 * widened**2 * unit.design.prediction(unit.noise)
     share = np.abs(force / norm[:, None])
     share = share / np.sqrt(np.mean(share**2, axis=0))
     by_axis = error[:, None] * share
@@ -148,8 +148,8 @@ def _verified(one: NormDwells, gravity: float, widened: float) -> dict[str, pd.D
         "norm_g": norm,
         "error_ug": error,
         "uncertainty_ug": np.sqrt(np.diagonal(expected)),
-        "reading_ug": MICRO * one.reading[unseen],
+        "reading_ug": MICRO * unit.reading[unseen],
         **{name: np.full(len(error), value) for name, value in of_unit.items()},
     }
     by_unit = {name: values[None] for name, values in columns.items()}
-    return verification_rows(one.lot, unseen, by_unit, by_axis[None], expected[None])
+    return verification_rows(unit.lot, unseen, by_unit, by_axis[None], expected[None])

@@ -65,7 +65,7 @@ def table(request: Request, name: str) -> Response:
 
 
 def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Value and ends of an interval in columns of their own; none for an interval that is not known."""
+    """Value and ends of an interval in separate columns; empty for an interval that is not known."""
     out: dict[str, Any] = {}
     for key, value in row.items():
         if value is not None:

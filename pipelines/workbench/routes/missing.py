@@ -59,11 +59,11 @@ def missing(request: Request) -> Response:
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
         models=models.models(bench.settings),
         ladder_command=state.ladder_command(bench.settings.archive),
-        unit=state.unit if table is None else table.units[table.place_of(state.unit)],
+        unit=state.unit if table is None else table.units[table.index_of(state.unit)],
         against="" if diagnosed is None else _quantity(diagnosed, state), candidates=CANDIDATES, influence=INFLUENCE,
         two_models=TwoModelsPage(),
         drivers=[] if table is None else [(name, label) for name, (label, _) in table.drivers.items()],
-        is_file=any(one.is_file and one.name == state.source for one in chosen),
+        is_file=any(source.is_file and source.name == state.source for source in chosen),
     )  # fmt: skip
 
 
@@ -93,8 +93,8 @@ def save(request: Request, body: RequestBody) -> JSONResponse:
     added = list(state.added)
     start = [name for name in diagnosed.document["effects"] if name not in added]
     name, why = str(body.get("name", "")), str(body.get("why", ""))
-    place, version = models.save(bench.settings, name, start, added, state.formula, why, state.source)
-    return JSONResponse({"done": f"{place}: version {version} is saved"})
+    path, version = models.save(bench.settings, name, start, added, state.formula, why, state.source)
+    return JSONResponse({"done": f"{path}: version {version} is saved"})
 
 
 @router.post("/missing/formula")
@@ -106,9 +106,9 @@ def formula(body: RequestBody) -> JSONResponse:
     written = str(body.get("formula", "")).strip()
     with effects.additions_forgotten():
         (name,) = use_written_formulas([written], "formula")
-    kept = tuple(text for text in state.formula if text.partition("=")[0].strip().lower() != name)
-    added = tuple(one for one in state.added if one != name)
-    return JSONResponse({"address": state.address(formula=(*kept, written), added=(*added, name))})
+    others = tuple(text for text in state.formula if text.partition("=")[0].strip().lower() != name)
+    added = tuple(effect for effect in state.added if effect != name)
+    return JSONResponse({"address": state.address(formula=(*others, written), added=(*added, name))})
 
 
 def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:
@@ -132,7 +132,7 @@ def _of_residuals(diagnosed: Diagnosed, table: ResidualTable, state: MissingPage
     views = {f"effect-{k}": view for k, view in enumerate(diagnosed.views)}
     if name not in {"sphere", "drivers", "slots", *views}:
         raise no_figure(name)
-    before, unit = diagnosed.before, table.place_of(state.unit)
+    before, unit = diagnosed.before, table.index_of(state.unit)
     if name in views:
         return effect_chart(views[name], table.pick)
     if name == "slots":
@@ -145,8 +145,8 @@ def _of_residuals(diagnosed: Diagnosed, table: ResidualTable, state: MissingPage
 
 
 def _quantity(diagnosed: Diagnosed, state: MissingPage) -> str:
-    """The quantity of the address, else that of the missing effect, else the one that the residual follows most, else force."""
+    """The quantity of the address, else that of the missing effect, else that which the residual follows most, else force."""
     known = {} if diagnosed.table is None else diagnosed.table.drivers
     first = "" if diagnosed.table is None else diagnosed.table.first
-    followed = [first, *(str(one["driver"]) for one in diagnosed.document["where"])]
+    followed = [first, *(str(row["driver"]) for row in diagnosed.document["where"])]
     return next((name for name in (state.against, *followed) if name in known), "force")

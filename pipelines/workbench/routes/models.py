@@ -25,9 +25,9 @@ def shown(request: Request) -> Response:
     what_if, job, steps = None, None, []
     if state.model:
         try:
-            place = models.place_of(bench.settings, state.model)
+            path = models.path_of(bench.settings, state.model)
             with effects.additions_forgotten():
-                steps = versions(read_model(place))[::-1]
+                steps = versions(read_model(path))[::-1]
             what_if, job = bench.work("whatif", state, problems)
         except TumblelineError as problem:
             problems.append(str(problem))
@@ -69,7 +69,7 @@ def _releases(bench: Workbench) -> list[dict[str, Any]]:
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:
-    """Old and new value of a figure in columns of their own."""
+    """Old and new value of a figure in separate columns."""
     out: dict[str, Any] = {}
     for key, value in row.items():
         pair = isinstance(value, (list, tuple)) and len(value) == 2

@@ -70,16 +70,16 @@ def station_named(known: Sequence[StationOfPage], name: str) -> StationOfPage:
     """
     if not name:
         return known[0]
-    station = next((one for one in known if one.name == name), None)
+    station = next((station for station in known if station.name == name), None)
     if station is None:
-        names = [one.name for one in known]
+        names = [station.name for station in known]
         raise WrongUse(f"station: none of this workbench is called '{name[:60]}'; {did_you_mean(name, names)}")
     return station
 
 
 def station_at(known: Sequence[StationOfPage], address: str) -> StationOfPage:
     """The station of a lot; the first for a lot of a station that this workbench was not started with."""
-    return next((one for one in known if one.address == address), known[0])
+    return next((station for station in known if station.address == address), known[0])
 
 
 router = APIRouter()
@@ -95,16 +95,19 @@ REMEDIES = {
 
 @router.get("/operator")
 def operator(request: Request) -> Response:
-    """The newest lot as tiles, or the one of the address; seats to scan if no lot is running."""
+    """The lot of the address as tiles, by default the newest; seats to scan if no lot is running."""
     bench, state, problems = asked(request, OperatorPage)
     newest, known = lots.lots(bench.settings), stations_of(bench.settings)
-    chosen = next((one for one in newest if one.id == state.lot), None)
+    chosen = next((lot for lot in newest if lot.id == state.lot), None)
     station = station_at(known, chosen.station) if chosen else station_named(known, state.station)
-    here = [one for one in newest if one.station == station.address]
-    shown = chosen or next((one for one in here if not one.ended), None)
+    here = [lot for lot in newest if lot.station == station.address]
+    shown = chosen or next((lot for lot in here if not lot.ended), None)
     return page(
         request, "operator.html", state, problems, lot=shown, lots=here, remedies=REMEDIES, station=station,
-        busy={one.name: next((lot.phase for lot in newest if lot.station == one.address and not lot.ended), "") for one in known},
+        busy={
+            station.name: next((lot.phase for lot in newest if lot.station == station.address and not lot.ended), "")
+            for station in known
+        },
         stations=known, recipes=requests.recipes(bench.settings), slots=station.slots,
         faults=fault_rows() if station.simulated else [], live=OperatorPage(lot=shown.id) if shown else None,
     )  # fmt: skip
@@ -114,7 +117,7 @@ def operator(request: Request) -> Response:
 def drawn(request: Request, name: str, ending: str) -> Response:
     """Temperatures and angles of a lot so far."""
     bench, state, _ = asked(request, OperatorPage)
-    run = lots.state_of(lots.place_of(bench.settings, state.lot)).run
+    run = lots.state_of(lots.folder_of(bench.settings, state.lot)).run
     if name != "station":
         raise no_figure(name)
     return figure(chart_of_run(bench, run) if run else nothing_yet(), ending, f"{state.lot}-station")

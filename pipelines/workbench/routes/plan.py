@@ -32,12 +32,12 @@ STEP_DEG = 0.5
 
 
 def dragged_to(settings: WorkbenchSettings, state: PlanPage, name: str, x: float, y: float) -> PlanPage:
-    """The page with a pose at a place of the map; of the two ways to turn there, the one nearer to the pose's present angles.
+    """The page with a pose at a point of the map; of the two ways to turn there, that nearer to the pose's present angles.
 
     Raises
     ------
     WrongUse
-        The place is outside of the sphere.
+        The point is outside of the sphere.
     """
     force = direction_at(x, y)
     if force is None:
@@ -60,8 +60,8 @@ def turned_to(settings: WorkbenchSettings, state: PlanPage, name: str, outer: fl
     TumblelineError
         There is no such pose, or the recipe cannot work with it there.
     """
-    kept = tuple(text for text in state.pose if next(iter(moves_of([text], "plan"))) != name)
-    new = state.model_copy(update={"pose": (*kept, f"{name}={outer:g},{inner:g}"), "edit": name})
+    others = tuple(text for text in state.pose if next(iter(moves_of([text], "plan"))) != name)
+    new = state.model_copy(update={"pose": (*others, f"{name}={outer:g},{inner:g}"), "edit": name})
     _recipe(settings, new)
     return new
 
@@ -79,17 +79,17 @@ def save_recipe(settings: WorkbenchSettings, state: PlanPage, name: str) -> Path
             f"recipe: name '{shown(name, 60)}', lower-case letters, digits, ., - and _ are needed, and no built-in name; "
             "write one such as my-line"
         )
-    place = settings.folder / f"{name}.toml"
-    if place.exists():
-        raise WrongUse(f"recipe: {place} exists already; choose another name")
+    path = settings.folder / f"{name}.toml"
+    if path.exists():
+        raise WrongUse(f"recipe: {path} exists already; choose another name")
     recipe = _recipe(settings, state)
     limits = limits_from(recipe.limits, folder_of(state.recipe), settings.folder)
     moved = ", ".join(state.pose) or "no pose is moved"
     new = recipe.model_copy(update={"name": name, "limits": limits})
     text = recipe_text(new, [f"Recipe {state.recipe} with poses moved by hand (outer, inner in degrees): {moved}."])
     settings.folder.mkdir(parents=True, exist_ok=True)
-    files.publish(place, text.encode(), "recipe", files.ELSEWHERE)
-    return place
+    files.publish(path, text.encode(), "recipe", files.ELSEWHERE)
+    return path
 
 
 def _recipe(settings: WorkbenchSettings, state: PlanPage) -> Recipe:
@@ -144,7 +144,7 @@ def visibility(request: Request) -> Response:
 
 @router.post("/plan/pose")
 def move(request: Request, body: RequestBody) -> JSONResponse:
-    """The address of the page with a pose at other angles, or dropped at a place of the map."""
+    """The address of the page with a pose at other angles, or dropped at a point of the map."""
     bench, state = workbench_of(request), state_at(body, PlanPage)
     name = str(body.get("name", ""))
     if "x" in body:
@@ -160,8 +160,8 @@ def move(request: Request, body: RequestBody) -> JSONResponse:
 def save(request: Request, body: RequestBody) -> JSONResponse:
     """Write the recipe with its moved poses as a new file."""
     bench, state = workbench_of(request), state_at(body, PlanPage)
-    place = save_recipe(bench.settings, state, str(body.get("name", "")).strip())
-    return JSONResponse({"done": f"{place} is written", "shown": PlanPage(recipe=str(place)).address()})
+    path = save_recipe(bench.settings, state, str(body.get("name", "")).strip())
+    return JSONResponse({"done": f"{path} is written", "shown": PlanPage(recipe=str(path)).address()})
 
 
 def _numbers(body: dict[str, object], *names: str) -> list[float]:

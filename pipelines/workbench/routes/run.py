@@ -46,7 +46,7 @@ def run(request: Request) -> Response:
     cells = _cells(bench, stored.id, tables)
     try:
         ledger = stated(stored, [str(row["unit"]) for row in grades])
-        certificates = {unit: one.sentence() for unit, one in ledger.items()}
+        certificates = {unit: calibration.sentence() for unit, calibration in ledger.items()}
     except TumblelineError as problem:
         certificates = {}
         problems.append(str(problem))
@@ -80,42 +80,42 @@ def _other(bench: Workbench, state: RunPage, problems: list[str]) -> dict[str, A
     except TumblelineError as problem:
         problems.append(str(problem))
         return None
-    own, tables = bench.archive.run(state.run), stored.tables()
+    this, tables = bench.archive.run(state.run), stored.tables()
     grades = rows_of(run_table(bench, stored.id, "grades")) if "grades" in tables else []
     return {
         "id": stored.id,
         "cells": _cells(bench, stored.id, tables),
         "outcomes": {str(row["unit"]): str(row["outcome"]) for row in grades},
         "judged": _judged(bench, stored.id, tables),
-        "changes": _changes(bench, own, stored),
-        "k": f"{coverage_of(own.about):g}",
+        "changes": _changes(bench, this, stored),
+        "k": f"{coverage_of(this.about):g}",
     }
 
 
-def _changes(bench: Workbench, own: Run, other: Run) -> dict[tuple[str, str], tuple[str, str]]:
+def _changes(bench: Workbench, this: Run, other: Run) -> dict[tuple[str, str], tuple[str, str]]:
     """By unit and figure, this run less the other: the difference and its U as texts.
 
     Of two measurements U is that of independent ones, with k of this run: what their station has in common makes it smaller. Two
     analyses of one measurement share its noise, and the difference has no U.
     """
-    if not all("figures" in one.tables() for one in (own, other)):
+    if not all("figures" in run.tables() for run in (this, other)):
         return {}
-    one, its = (
+    figures, beside = (
         {(str(row["unit"]), str(row["figure"])): row for row in rows_of(with_standard_error(run.about, table))}
-        for run, table in ((run, run_table(bench, run.id, "figures")) for run in (own, other))
+        for run, table in ((run, run_table(bench, run.id, "figures")) for run in (this, other))
     )
-    apart, k = _measurement(own) != _measurement(other), coverage_of(own.about)
+    apart, k = _measurement(this) != _measurement(other), coverage_of(this.about)
     found: dict[tuple[str, str], tuple[str, str]] = {}
-    for key in one.keys() & its.keys():
-        change = float(one[key]["value"]) - float(its[key]["value"])
-        standard = [float(rows[key]["standard_error"]) for rows in (one, its)]
+    for key in figures.keys() & beside.keys():
+        change = float(figures[key]["value"]) - float(beside[key]["value"])
+        standard = [float(rows[key]["standard_error"]) for rows in (figures, beside)]
         if key[1] in SHOWN and math.isfinite(change):
             found[key] = with_uncertainty(change, k * math.hypot(*standard) if apart else 0.0)
     return found
 
 
 def _measurement(run: Run) -> str:
-    """What all analyses of one measurement have in common: its capture, else the file that it was imported from, else the run."""
+    """The identity of the measurement that a run analyses: its capture, else the file that it was imported from, else the run."""
     about = run.about
     source = (about.get("source") or {}).get("sha256")
     return str(about.get("capture") or source or about.get("rerun_of") or run.id)

@@ -1,4 +1,4 @@
-"""Scripts and styles, by addresses that change with their content; the one of Plotly is compressed already."""
+"""Scripts and styles, by addresses that change with their content; that of Plotly is compressed already."""
 
 import gzip
 from functools import cache
@@ -45,6 +45,6 @@ def _bundle() -> bytes:
 @cache
 def _file(name: str) -> bytes | None:
     """The content of a file; None if it does not exist."""
-    known = {place.name: place for place in (files("pipelines.workbench") / "static").iterdir() if place.is_file()}
+    known = {path.name: path for path in (files("pipelines.workbench") / "static").iterdir() if path.is_file()}
     known[PAINT] = files("pipelines.drawing") / PAINT
     return known[name].read_bytes() if name in known and name.rpartition(".")[2] in KINDS else None

@@ -33,22 +33,28 @@ def two_models(request: Request) -> Response:
         state = state.model_copy(update={"source": sources.resolve(bench.settings, state.source, "two models")})
         sides = requests.two_models(bench.settings, state)
         works = [("diagnose", side) for side in sides] + [("coefficients", state)]
-        results = [bench.work(kind, one, problems) for kind, one in works]
+        results = [bench.work(kind, content, problems) for kind, content in works]
         *found, rows = [result for result, _ in results]
         waiting = next(
-            ((kind, one, job) for (kind, one), (result, job) in zip(works, results, strict=True) if result is None),
+            (
+                (kind, content, job)
+                for (kind, content), (result, job) in zip(works, results, strict=True)
+                if result is None
+            ),
             None,
         )
     except TumblelineError as problem:
         problems.append(str(problem))
-    table = next((one.table for one in found if one is not None and one.table is not None), None)
+    table = next(
+        (diagnosed.table for diagnosed in found if diagnosed is not None and diagnosed.table is not None), None
+    )
     return page(
         request, "two_models.html", state, problems, sides=sides, found=found, effects=_lacking(sides), waiting=waiting,
         names=NAMES,
         rows=None if rows is None else [_worded(row, sides) for row in _ordered(rows)[:MOST]], count=len(rows or ()),
         sources=sources.sources(bench.settings), models=models.models(bench.settings), offered=_offered(state, found),
         against=_quantity(state, found), drivers=[] if table is None else [(k, label) for k, (label, _) in table.drivers.items()],
-        units=() if table is None else table.units, unit="" if table is None else table.units[table.place_of(state.unit)],
+        units=() if table is None else table.units, unit="" if table is None else table.units[table.index_of(state.unit)],
     )  # fmt: skip
 
 
@@ -70,7 +76,7 @@ def drawn(request: Request, name: str, ending: str) -> Response:
 
 def _chart(bench: Workbench, state: TwoModelsPage) -> Chart | None:
     found: list[Any] = [bench.done("diagnose", side) for side in requests.two_models(bench.settings, state)]
-    first, second = (None if one is None else one.table for one in found)
+    first, second = (None if diagnosed is None else diagnosed.table for diagnosed in found)
     if first is None or second is None:
         return None
     if first.units != second.units or first.residual.shape != second.residual.shape:
@@ -79,7 +85,7 @@ def _chart(bench: Workbench, state: TwoModelsPage) -> Chart | None:
             "look at each on the page Missing effects"
         )
     quantity = _quantity(state, found)
-    return quantity_chart(second, first.residual, quantity, first.place_of(state.unit), names=NAMES)
+    return quantity_chart(second, first.residual, quantity, first.index_of(state.unit), names=NAMES)
 
 
 def _lacking(sides: tuple[MissingPage, ...]) -> list[str]:
@@ -106,7 +112,7 @@ def _worded(row: dict[str, Any], sides: tuple[MissingPage, ...]) -> dict[str, An
 
 
 def _of_difference(first: float, second: float, sides: tuple[MissingPage, ...]) -> float:
-    """Most that U of a difference can be, from U of both coefficients; the same noise is in both.
+    """Upper limit of U of a difference of two coefficients that share their noise, from U of both.
 
     Generalised least squares with one covariance of the dwells for both: the estimate of a model is not correlated with what a
     larger one changes in it, so the variance of the change is that of the larger model less that of the smaller one (Hausman
@@ -119,8 +125,8 @@ def _of_difference(first: float, second: float, sides: tuple[MissingPage, ...]) 
 
 
 def _quantity(state: TwoModelsPage, found: list[Diagnosed | None]) -> str:
-    """The quantity of the address, else the one on which the effect depends that the second has besides, else force."""
-    tables = [one.table for one in found[::-1] if one is not None and one.table is not None]
+    """The quantity of the address, else that on which the additional effect of the second model depends, else force."""
+    tables = [diagnosed.table for diagnosed in found[::-1] if diagnosed is not None and diagnosed.table is not None]
     wanted = [state.against, *(table.first for table in tables)]
     return next((name for name in wanted if tables and name in tables[0].drivers), "force")
 

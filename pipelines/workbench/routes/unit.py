@@ -44,19 +44,19 @@ def unit(request: Request) -> Response:
     """All data of a unit in a run."""
     bench, state, problems = asked(request, UnitPage)
     run = bench.archive.run(state.run)
-    units = [str(one["serial"]) for one in run.about.get("lot", {}).get("units", [])]
+    units = [str(seat["serial"]) for seat in run.about.get("lot", {}).get("units", [])]
     state = state.model_copy(update={"run": run.id, "unit": state.unit or (units[0] if units else "")})
     if state.unit not in units:
         raise WrongUse(f"unit '{state.unit[:80]}' is not in run {run.id}; its units are {', '.join(units[:8])}")
     if part_of(request) == "samples":
         return page_part(request, "unit_samples.html", state)
     tables = run.tables()
-    own = {
+    rows = {
         name: rows_of(_table(bench, state, name))
         for name in ("grades", "figures", "coefficients", "noise", "verdicts", "uncertainties")
         if name in tables
     }
-    grade = next(iter(own.get("grades", [])), None)
+    grade = next(iter(rows.get("grades", [])), None)
     history = _history(bench, state.unit)
     drivers: dict[str, str] = {}
     parameters = list(dict.fromkeys(_parameter(row) for row in history))
@@ -65,11 +65,11 @@ def unit(request: Request) -> Response:
     if "residuals" in tables and grade is not None and grade["outcome"] != "refused":
         state = state.model_copy(update={"against": _against(bench, state)})
         drivers = run_pictures.quantities(_table(bench, state, "residuals"), _table(bench, state, "dwells"))
-    place = units.index(state.unit)
+    index = units.index(state.unit)
     return page(
-        request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units, drivers=drivers,
-        before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
-        coefficients=side_by_side(own.get("coefficients", []), _expanded), parameters=parameters,
+        request, "unit.html", state, problems, run=run, grade=grade, rows=rows, tables=tables, units=units, drivers=drivers,
+        before=units[index - 1] if index else "", after=units[index + 1] if index + 1 < len(units) else "",
+        coefficients=side_by_side(rows.get("coefficients", []), _expanded), parameters=parameters,
         coverage=coverage_of(run.about),
         names=NAMES, noise_terms=NOISE_TERMS, axis_word=axis_word, figure_label=figure_label,
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
@@ -111,7 +111,7 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
 
 
 def _against(bench: Workbench, state: UnitPage) -> str:
-    """What the residuals are drawn against: as the address says, else what they depend on most, if anything is missing."""
+    """The quantity against which residuals are drawn: that of the address, else that on which they depend most."""
     if state.against:
         return state.against
     tables = bench.archive.run(state.run).tables()

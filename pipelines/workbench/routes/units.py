@@ -28,16 +28,16 @@ def units(request: Request) -> Response:
         every = (
             info_of(bench.archive.run(str(name))) for name, _ in bench.index.ask(newest_question(MOST_LOOKED)).rows
         )
-        infos = list(islice((one for one in every if one is not None and is_of(one, state.runs)), NEWEST))
+        infos = list(islice((info for info in every if info is not None and is_of(info, state.runs)), NEWEST))
     return page(
         request, "units.html", state, problems, rows=rows, counts=counts, total=sum(counts.values()), per_page=ROWS,
-        runs=[one for one in infos if one is not None], run_count=newest[0][1] if newest else 0,
+        runs=[info for info in infos if info is not None], run_count=newest[0][1] if newest else 0,
     )  # fmt: skip
 
 
 @router.get("/units/table.csv")
 def table(request: Request) -> Response:
-    """All units of the search."""
+    """The units of the search as a CSV file."""
     bench, state, _ = asked(request, UnitsPage)
     return table_csv(bench.index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING)).documents(), "units")
 

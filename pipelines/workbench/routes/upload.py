@@ -38,7 +38,7 @@ def upload(request: Request) -> Response:
     files = [path for path in folder.iterdir() if not path.name.startswith(uploads.PART)] if folder.is_dir() else []
     there = sorted(files, key=lambda file: -file.stat().st_mtime)[:12]
     return page(
-        request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(one) for one in there],
+        request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(file) for file in there],
         meanings=MEANINGS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
         level=partial(_level, 0.0 if reading is None else _largest(reading.dwells)),
         outputs=list(OUTPUT_UNITS), times=[*TIME_UNITS, "samples"], temperatures=TEMPERATURE_UNITS,
@@ -53,7 +53,7 @@ def _largest(dwells: Iterable[Mapping[str, Any]]) -> float:
 
 
 def _level(largest: float, value: float) -> str:
-    """The mean of a dwell to the sixth digit of the largest, so that those near zero stand in the same places."""
+    """The mean of a dwell to the sixth digit of the largest, so that values near zero have equally many decimals."""
     return with_uncertainty(float(value), 2e-5 * largest)[0]
 
 
@@ -73,10 +73,10 @@ async def dropped(request: Request, name: str) -> JSONResponse:
                 await run_in_threadpool(file.write, part)
         if not size:
             raise WrongUse(f"upload: '{name[:80]}' is empty; choose another file")
-        place = await run_in_threadpool(uploads.keep, settings, name, arrived)
+        path = await run_in_threadpool(uploads.keep, settings, name, arrived)
     finally:
         arrived.unlink(missing_ok=True)
-    return JSONResponse({"address": UploadPage(file=place).address()})
+    return JSONResponse({"address": UploadPage(file=path).address()})
 
 
 @router.get("/upload/coefficients.csv")

@@ -68,7 +68,7 @@ class RecentIndex:
             return self._known
 
     def _renew(self) -> AuditIndex:
-        """The index made new; kept unless a newer one was made in the meantime. The lock may be held by the caller."""
+        """The index made new; stored unless a newer index was made in the meantime. The lock may be held by the caller."""
         folder, start = self._stamp(), time.monotonic()
         index = up_to_date(self._archive)
         with self._lock:

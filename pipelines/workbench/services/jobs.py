@@ -86,8 +86,8 @@ def _serve(pipe: Connection) -> None:
 class Jobs:
     """The table of jobs."""
 
-    def __init__(self, place: Path, workers: int) -> None:
-        self._place, self._workers = place, max(1, workers)
+    def __init__(self, path: Path, workers: int) -> None:
+        self._path, self._workers = path, max(1, workers)
         self._lock = threading.RLock()
         self._jobs: OrderedDict[str, BackgroundJob] = OrderedDict()
         self._results: OrderedDict[str, Any] = OrderedDict()
@@ -99,7 +99,7 @@ class Jobs:
         self._remember()
 
     def submit(self, kind: str, title: str, request: Mapping[str, Any]) -> BackgroundJob:
-        """The job for a request: the existing one, or a new one at the end of the queue."""
+        """The job for a request: the existing job, or a new job at the end of the queue."""
         name = key_of(kind, request)
         with self._lock:
             known = self._jobs.get(name)
@@ -128,7 +128,7 @@ class Jobs:
             return self._results.get(name)
 
     def known(self, kind: str, request: Mapping[str, Any]) -> BackgroundJob | None:
-        """The job of a request, if there is one."""
+        """The job of a request; None where it was not asked for."""
         with self._lock:
             return self._jobs.get(key_of(kind, request))
 
@@ -166,7 +166,7 @@ class Jobs:
             process.end()
 
     def _work(self) -> None:
-        """The loop of a thread: it owns one process, and a new one after that has ended."""
+        """The loop of a thread: it owns a process, and starts another after that has ended."""
         process: _Process | None = None
         while (name := self._queue.get()) is not None:
             with self._lock:
@@ -224,21 +224,23 @@ class Jobs:
             self._keep()
 
     def _keep(self) -> None:
-        """Store the list of jobs, so that the next server can state the interrupted ones."""
+        """Store the list of jobs, so that the next server can state the interrupted jobs."""
         with suppress(ArchiveUnusable, OSError):
             content = [job.document() for job in list(self._jobs.values())[-20:]]
-            self._place.parent.mkdir(parents=True, exist_ok=True)
-            files.publish(self._place, files.json_bytes({"jobs": content}), "jobs", files.ELSEWHERE)
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            files.publish(self._path, files.json_bytes({"jobs": content}), "jobs", files.ELSEWHERE)
 
     def _remember(self) -> None:
         """The unfinished jobs of an earlier server process."""
-        if not self._place.is_file():
+        if not self._path.is_file():
             return
         with suppress(ArchiveUnusable, KeyError, TypeError):
-            for one in files.read_json(self._place)["jobs"]:
-                if one["state"] in {"waiting", "running"}:
+            for stored in files.read_json(self._path)["jobs"]:
+                if stored["state"] in {"waiting", "running"}:
                     note = "the server ended before it was done; start it again"
-                    job = BackgroundJob(str(one["id"]), str(one["kind"]), str(one["title"]), "interrupted", note=note)
+                    job = BackgroundJob(
+                        str(stored["id"]), str(stored["kind"]), str(stored["title"]), "interrupted", note=note
+                    )
                     self._jobs[job.id] = job
 
 

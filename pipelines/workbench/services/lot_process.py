@@ -23,8 +23,8 @@ EVERY_S = 0.25
 class Pages:
     """The state of a lot, written for the pages; and the answers of the pages."""
 
-    def __init__(self, place: Path, before: dict[str, Any]) -> None:
-        self._place, self._told = place, 0.0
+    def __init__(self, folder: Path, before: dict[str, Any]) -> None:
+        self._folder, self._told = folder, 0.0
         self._state: dict[str, Any] = {
             **before,
             "pid": os.getpid(),
@@ -37,7 +37,7 @@ class Pages:
     def put(self, **changes: Any) -> None:
         """Write the state with some values changed."""
         self._state |= changes
-        write_state(self._place, self._state)
+        write_state(self._folder, self._state)
         self._told = time.monotonic()
 
     def progress(self, done: int, total: int, note: str) -> None:
@@ -50,18 +50,18 @@ class Pages:
         number = int(self._state["number"]) + 1
         question = {"kind": prompt.kind, "text": prompt.text, "slots": [list(slot) for slot in prompt.slots]}
         self.put(phase="asks", question=question, number=number)
-        place = self._place / f"answer-{number}.json"
-        while not place.is_file() or place.stat().st_size == 0:
+        path = self._folder / f"answer-{number}.json"
+        while not path.is_file() or path.stat().st_size == 0:
             time.sleep(POLL_S)
-        reply = str(files.read_json(place)["answer"])
+        reply = str(files.read_json(path)["answer"])
         self.put(phase="measuring", question=None)
         return "stop" if reply == "stop" else "go"
 
 
-def measure(place: Path) -> str:
+def measure(folder: Path) -> str:
     """Measure the lot of a folder; the phase in which it ended."""
-    request = files.read_json(place / "request.json")
-    pages = Pages(place, files.read_json(place / "state.json"))
+    request = files.read_json(folder / "request.json")
+    pages = Pages(folder, files.read_json(folder / "state.json"))
     signal.signal(signal.SIGTERM, _stopped)
     try:
         _measured(request, pages)

@@ -97,27 +97,27 @@ def start(settings: WorkbenchSettings, lot_request: Request) -> LotState:
                 f"lot: the station has lot {other.id} ({other.phase}), one lot at a time is possible; finish or stop that one "
                 "first"
             )
-    place = settings.folder / FOLDER / name
-    known = state_of(place) if (place / "state.json").is_file() else None
+    folder = settings.folder / FOLDER / name
+    known = state_of(folder) if (folder / "state.json").is_file() else None
     if known is not None and not known.idle:
         return known
-    place.mkdir(parents=True, exist_ok=True)
-    (place / PAUSED).unlink(missing_ok=True)
-    for old in place.glob("answer-*.json"):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / PAUSED).unlink(missing_ok=True)
+    for old in folder.glob("answer-*.json"):
         old.unlink()
-    files.publish(place / "request.json", files.json_bytes(content), "lot", files.ELSEWHERE)
-    write_state(place, {"phase": "starting", "since": time.time(), "number": 0 if known is None else known.number})
-    with (place / "log.txt").open("ab") as log:
+    files.publish(folder / "request.json", files.json_bytes(content), "lot", files.ELSEWHERE)
+    write_state(folder, {"phase": "starting", "since": time.time(), "number": 0 if known is None else known.number})
+    with (folder / "log.txt").open("ab") as log:
         subprocess.Popen(  # noqa: S603 - our own interpreter and module
-            [sys.executable, "-m", "pipelines.workbench.services.lot_process", str(place)],
+            [sys.executable, "-m", "pipelines.workbench.services.lot_process", str(folder)],
             stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
         )  # fmt: skip
-    return state_of(place)
+    return state_of(folder)
 
 
 def again(settings: WorkbenchSettings, name: str) -> LotState:
     """The continuation of a stopped lot."""
-    return start(settings, request_of(files.read_json(place_of(settings, name) / "request.json")))
+    return start(settings, request_of(files.read_json(folder_of(settings, name) / "request.json")))
 
 
 def request_of(content: Mapping[str, Any]) -> Request:
@@ -135,12 +135,12 @@ def answer(settings: WorkbenchSettings, name: str, number: int, reply: str) -> L
     Stale
         The question has changed, or was answered already.
     """
-    place = place_of(settings, name)
-    now = state_of(place)
+    folder = folder_of(settings, name)
+    now = state_of(folder)
     if now.phase != "asks" or now.number != number:
         raise Stale(f"lot {name}: the question was answered already; the page shows the present question")
     try:
-        handle = os.open(place / f"answer-{number}.json", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+        handle = os.open(folder / f"answer-{number}.json", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
     except FileExistsError:
         raise Stale(f"lot {name}: another page answered the question at the same time; no action is needed") from None
     with os.fdopen(handle, "w") as file:
@@ -150,39 +150,39 @@ def answer(settings: WorkbenchSettings, name: str, number: int, reply: str) -> L
 
 def stop(settings: WorkbenchSettings, name: str) -> LotState:
     """Stop a lot's process after the safe state; it continues when it is started again."""
-    place = place_of(settings, name)
-    (place / PAUSED).unlink(missing_ok=True)
-    return _ended(place)
+    folder = folder_of(settings, name)
+    (folder / PAUSED).unlink(missing_ok=True)
+    return _ended(folder)
 
 
 def pause(settings: WorkbenchSettings, name: str) -> LotState:
     """Stop a lot's process after the safe state; the lot keeps its station until it is continued or stopped."""
-    place = place_of(settings, name)
-    if state_of(place).ended:
+    folder = folder_of(settings, name)
+    if state_of(folder).ended:
         raise Stale(f"lot {name}: it has ended already; the page shows its present state")
-    (place / PAUSED).touch()
-    return _ended(place)
+    (folder / PAUSED).touch()
+    return _ended(folder)
 
 
 def pause_all(settings: WorkbenchSettings) -> list[str]:
     """Pause every lot that is measured, and wait until its process has made the station safe; the lots that did not in time."""
     working = [lot for lot in lots(settings) if not lot.idle]
-    for one in working:
-        pause(settings, one.id)
+    for lot in working:
+        pause(settings, lot.id)
     end = time.monotonic() + SAFE_S
-    while time.monotonic() < end and any(is_process(one.pid) for one in working if one.pid):
+    while time.monotonic() < end and any(is_process(lot.pid) for lot in working if lot.pid):
         time.sleep(POLL_S)
-    return [one.id for one in working if one.pid and is_process(one.pid)]
+    return [lot.id for lot in working if lot.pid and is_process(lot.pid)]
 
 
-def _ended(place: Path) -> LotState:
+def _ended(folder: Path) -> LotState:
     """Ask the process of a lot to end; the page shows the phase that it writes at its end."""
-    now = state_of(place)
+    now = state_of(folder)
     if not now.idle and now.pid and is_process(now.pid):
         os.kill(now.pid, signal.SIGTERM)
     else:
-        write_state(place, files.read_json(place / "state.json"))  # open pages look again
-    return state_of(place)
+        write_state(folder, files.read_json(folder / "state.json"))  # open pages look again
+    return state_of(folder)
 
 
 def lots(settings: WorkbenchSettings) -> list[LotState]:
@@ -190,41 +190,41 @@ def lots(settings: WorkbenchSettings) -> list[LotState]:
     top = settings.folder / FOLDER
     if not top.is_dir():
         return []
-    states = [state_of(place) for place in top.iterdir() if (place / "state.json").is_file()]
+    states = [state_of(folder) for folder in top.iterdir() if (folder / "state.json").is_file()]
     return sorted(states, key=lambda state: -state.since)[:NEWEST]
 
 
-def place_of(settings: WorkbenchSettings, name: str) -> Path:
+def folder_of(settings: WorkbenchSettings, name: str) -> Path:
     """The folder of a lot."""
-    place = settings.folder / FOLDER / name
-    if not (name.isalnum() and (place / "state.json").is_file()):
+    folder = settings.folder / FOLDER / name
+    if not (name.isalnum() and (folder / "state.json").is_file()):
         raise WrongUse(f"lot: none is called '{name[:40]}'; choose one of the page")
-    return place
+    return folder
 
 
-def state_of(place: Path) -> LotState:
+def state_of(folder: Path) -> LotState:
     """The state of a lot; one whose process ended unexpectedly is interrupted."""
-    request, now = files.read_json(place / "request.json"), files.read_json(place / "state.json")
+    request, now = files.read_json(folder / "request.json"), files.read_json(folder / "state.json")
     phase = str(now["phase"])
     pid = int(now.get("pid", 0))
     lost = (pid and not is_process(pid)) or (not pid and time.time() - float(now.get("since", 0.0)) > 60.0)
     if phase not in ENDED and lost:
         phase = "interrupted"
-    if phase == "stopped" and (place / PAUSED).is_file():
+    if phase == "stopped" and (folder / PAUSED).is_file():
         phase = PAUSED
     results = {int(slot): str(text) for slot, text in now.get("results", [])}
     seats = [(int(slot), str(serial)) for slot, serial in request["seats"]]
     told = {name: now[name] for name in TOLD if name in now}
     return LotState(
-        id=place.name, phase=phase, recipe=str(request["recipe"]), units=tuple(serial for _, serial in seats),
+        id=folder.name, phase=phase, recipe=str(request["recipe"]), units=tuple(serial for _, serial in seats),
         slots=tuple((slot, serial, results.get(slot, "")) for slot, serial in seats), pid=pid,
         station=str(request.get("station") or ""), **told,
     )  # fmt: skip
 
 
-def write_state(place: Path, content: dict[str, Any]) -> None:
+def write_state(folder: Path, content: dict[str, Any]) -> None:
     """Replace a lot's state atomically."""
-    files.publish(place / "state.json", files.json_bytes(content), "lot", files.ELSEWHERE)
+    files.publish(folder / "state.json", files.json_bytes(content), "lot", files.ELSEWHERE)
 
 
 def stamp(settings: WorkbenchSettings) -> str:
@@ -232,5 +232,5 @@ def stamp(settings: WorkbenchSettings) -> str:
     top = settings.folder / FOLDER
     if not top.is_dir():
         return ""
-    newest = [place.stat().st_mtime_ns for place in top.glob("*/state.json")]
+    newest = [path.stat().st_mtime_ns for path in top.glob("*/state.json")]
     return f"{len(newest)}.{max(newest, default=0)}"

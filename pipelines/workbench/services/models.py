@@ -23,10 +23,10 @@ _ALONE = threading.Lock()
 def models(settings: WorkbenchSettings) -> list[str]:
     """Names of the existing model files."""
     folder = settings.folder / FOLDER
-    return sorted(place.stem for place in folder.glob("*.toml")) if folder.is_dir() else []
+    return sorted(path.stem for path in folder.glob("*.toml")) if folder.is_dir() else []
 
 
-def place_of(settings: WorkbenchSettings, name: str) -> Path:
+def path_of(settings: WorkbenchSettings, name: str) -> Path:
     """The file of a model.
 
     Raises
@@ -54,7 +54,7 @@ def release(settings: WorkbenchSettings, name: str, since: str, device: str, sta
     from pipelines.rerun.selection import moment
 
     with _ALONE, effects.additions_forgotten():
-        change = change_from_options("", place_of(settings, name), where="release")
+        change = change_from_options("", path_of(settings, name), where="release")
         archive = Archive(settings.archive)
         return publish(archive, change, moment(since, "release"), device=device, station=station, reason=reason)
 
@@ -68,11 +68,11 @@ def save(
     why: str,
     source: str,
 ) -> tuple[Path, int]:
-    """The file and the version after every effect of ``added`` that it lacks is a version of its own.
+    """The file and its last version: each effect of ``added`` that the model lacks makes a further version.
 
     Parameters
     ----------
-    start : the model that a new file begins with · formulas : ``id = expression`` of the used ones
+    start : the model that a new file begins with · formulas : ``id = expression`` of the formulas that are used
     why, source : the reason, and the dwells with the evidence
 
     Raises
@@ -86,17 +86,17 @@ def save(
         )
     if not why.strip():
         raise WrongUse("model: no reason is given, one sentence is needed; write why the effect is added")
-    place = settings.folder / FOLDER / f"{name}.toml"
+    path = settings.folder / FOLDER / f"{name}.toml"
     by, at = getpass.getuser(), datetime.now(UTC).replace(microsecond=0)
     with _ALONE, effects.additions_forgotten():
         use_written_formulas(formulas, "model")
-        text = model_text(place) if place.is_file() else new_model(place, list(start), by, at)
+        text = model_text(path) if path.is_file() else new_model(path, list(start), by, at)
         text = with_formulas(text, formulas, [*start, *added])
         lacking = [effect for effect in dict.fromkeys(added) if f'"{effect}"' not in text.partition("[[change]]")[0]]
         steps = [ModelStep(effect, by, at, why.strip(), source) for effect in lacking]
-        text, after = with_effects(text, steps, place)
-        if after is None and place.is_file():
-            raise WrongUse(f"model: {place} has these effects already; nothing was written")
-        place.parent.mkdir(parents=True, exist_ok=True)
-        publish_model(place, text)
-    return place, after.model.version if after else 1
+        text, after = with_effects(text, steps, path)
+        if after is None and path.is_file():
+            raise WrongUse(f"model: {path} has these effects already; nothing was written")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        publish_model(path, text)
+    return path, after.model.version if after else 1

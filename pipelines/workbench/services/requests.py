@@ -65,8 +65,8 @@ def two_models(settings: WorkbenchSettings, page: TwoModelsPage) -> tuple[Missin
 def _of_model(settings: WorkbenchSettings, source: str, model: str, added: tuple[str, ...]) -> MissingPage:
     if not model:
         return settled(settings, MissingPage(source=source, added=added))
-    file = read_model(models.place_of(settings, model))
-    formulas = tuple(f"{one.id} = {'; '.join(one.columns)}" for one in file.formula)
+    file = read_model(models.path_of(settings, model))
+    formulas = tuple(f"{formula.id} = {'; '.join(formula.columns)}" for formula in file.formula)
     return settled(
         settings, MissingPage(source=source, effects=tuple(file.model.effects), added=added, formula=formulas)
     )
@@ -107,22 +107,22 @@ def default_model_of(archive: str, name: str) -> tuple[str, ...]:
 
 def plan(settings: WorkbenchSettings, page: PlanPage) -> Request:
     """The plan of a recipe."""
-    known, place = recipes(settings), Path(page.recipe)
+    known, path = recipes(settings), Path(page.recipe)
     if page.recipe not in known:
         raise WrongUse(f"plan: no recipe is called '{page.recipe[:60]}'; {did_you_mean(page.recipe, known)}")
     return f"plan of {page.recipe}", {
         "archive": settings.archive, "recipe": page.recipe, "effects": list(page.effects), "pose": list(page.pose),
-        "station": str(settings.station or ""), "stamp": place.stat().st_mtime_ns if place.is_file() else 0,
+        "station": str(settings.station or ""), "stamp": path.stat().st_mtime_ns if path.is_file() else 0,
     }  # fmt: skip
 
 
 def what_if(settings: WorkbenchSettings, page: ModelsPage) -> Request:
     """The lots of the archive with a model beside their own."""
-    place = models.place_of(settings, page.model)
-    return f"what if {place.stem}", {
+    path = models.path_of(settings, page.model)
+    return f"what if {path.stem}", {
         "archive": settings.archive,
-        "model": str(place),
-        "stamp": place.stat().st_mtime_ns,
+        "model": str(path),
+        "stamp": path.stat().st_mtime_ns,
         "runs": sources.archive_stamp(settings),
     }
 
@@ -148,23 +148,23 @@ def discover(settings: WorkbenchSettings, page: DiscoverPage) -> Request:
 
 def bring_in(settings: WorkbenchSettings, page: UploadPage) -> Request:
     """The import of a file."""
-    place = uploads.resolve(settings, page.file)
+    path = uploads.resolve(settings, page.file)
     content = page.model_dump(mode="json", exclude={"run"})
-    return f"import of {place.name}", {**content, "archive": settings.archive}
+    return f"import of {path.name}", {**content, "archive": settings.archive}
 
 
 def recipes(settings: WorkbenchSettings) -> list[str]:
     """Available recipes: the built-in one, and files of the workbench's folder."""
-    names = [str(place) for place in sorted(settings.folder.glob("*.toml"))] if settings.folder.is_dir() else []
+    names = [str(path) for path in sorted(settings.folder.glob("*.toml"))] if settings.folder.is_dir() else []
     return ["production", *(name for name in names if _is_recipe(Path(name)))]
 
 
-def _is_recipe(place: Path) -> bool:
+def _is_recipe(path: Path) -> bool:
     try:
-        text = place.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return False
-    return not place.is_symlink() and "[model]" not in text and ("poses" in text or "temperatures_C" in text)
+    return not path.is_symlink() and "[model]" not in text and ("poses" in text or "temperatures_C" in text)
 
 
 KINDS: dict[str, tuple[type[PageState], Callable[[WorkbenchSettings, Any], Request]]] = {

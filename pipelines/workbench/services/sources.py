@@ -53,9 +53,9 @@ def is_file(settings: WorkbenchSettings, name: str) -> bool:
 
 def stamp(settings: WorkbenchSettings, name: str) -> str:
     """A value that changes with the content of a source."""
-    place = Path(name)
-    if place.suffix and place.is_file():
-        about = place.stat()
+    path = Path(name)
+    if path.suffix and path.is_file():
+        about = path.stat()
         return f"{about.st_size}.{about.st_mtime_ns}"
     run = Archive(settings.archive).run(name)
     return run.id if "dwells" not in run.tables() else str(run.manifest("dwells")["sha256"])
@@ -70,16 +70,16 @@ def archive_stamp(settings: WorkbenchSettings) -> str:
     if not runs.is_dir():
         return ""
     with os.scandir(runs) as entries:
-        times = [place.stat().st_mtime_ns for place in entries]
+        times = [entry.stat().st_mtime_ns for entry in entries]
     return f"{len(times)}.{max(times, default=0)}"
 
 
 def twin(settings: WorkbenchSettings, name: str) -> str:
     """The fresh measurement beside a file of dwells; empty if there is none."""
-    place = Path(name)
-    for stem in (place.stem.replace("dwells", "fresh"), f"{place.stem}-fresh", f"fresh-{place.stem}"):
-        beside = place.with_name(stem + place.suffix)
-        if beside != place and str(beside) in {file.name for file in _files(settings.folder)}:
+    path = Path(name)
+    for stem in (path.stem.replace("dwells", "fresh"), f"{path.stem}-fresh", f"fresh-{path.stem}"):
+        beside = path.with_name(stem + path.suffix)
+        if beside != path and str(beside) in {file.name for file in _files(settings.folder)}:
             return str(beside)
     return ""
 
@@ -88,10 +88,10 @@ def _files(folder: Path) -> list[DataSource]:
     if not folder.is_dir():
         return []
     files: list[DataSource] = []
-    for place in sorted([*folder.iterdir(), *(p for sub in folder.iterdir() if _is_open(sub) for p in sub.iterdir())]):
-        usable = place.name.endswith(ENDINGS) and place.is_file() and not place.name.startswith(".")
-        if usable and "history" not in place.name and not place.is_symlink():
-            files.append(DataSource(str(place), place.name, is_file=True))
+    for path in sorted([*folder.iterdir(), *(p for sub in folder.iterdir() if _is_open(sub) for p in sub.iterdir())]):
+        usable = path.name.endswith(ENDINGS) and path.is_file() and not path.name.startswith(".")
+        if usable and "history" not in path.name and not path.is_symlink():
+            files.append(DataSource(str(path), path.name, is_file=True))
     return files[:MOST_FILES]
 
 
@@ -103,7 +103,7 @@ def _is_open(folder: Path) -> bool:
 def _runs(settings: WorkbenchSettings) -> list[DataSource]:
     infos = Archive(settings.archive).runs()[-NEWEST:][::-1]
     return [
-        DataSource(one.id, f"{one.id} · {one.started[:10]}", is_file=False, units=len(one.units))
-        for one in infos
-        if {"reduce", "import"} & set(one.stages)
+        DataSource(info.id, f"{info.id} · {info.started[:10]}", is_file=False, units=len(info.units))
+        for info in infos
+        if {"reduce", "import"} & set(info.stages)
     ]

@@ -36,7 +36,7 @@ WAIT_S = 120.0
 LARGEST = 400_000_000
 NAME = re.compile(r"[^A-Za-z0-9._ -]+")
 PACKED = (".csv", ".tsv", ".txt", ".parquet")
-ENDINGS = (*PACKED, ".dat", ".mat", ".npy", ".h5", ".hdf5", ".xlsx", ".ods", *(f"{one}.gz" for one in PACKED))
+ENDINGS = (*PACKED, ".dat", ".mat", ".npy", ".h5", ".hdf5", ".xlsx", ".ods", *(f"{ending}.gz" for ending in PACKED))
 MOST_ROWS = 8
 MOST_LOOKED = 200_000
 """Rows in which columns are recognised: an hour of 50 Hz."""
@@ -102,34 +102,34 @@ def keep(settings: WorkbenchSettings, name: str, part: Path) -> str:
     folder = folder_of(settings)
     stem, dot, ending = plain.partition(".")
     for number in range(1000):
-        place = folder / (plain if number == 0 else f"{stem}-{number}{dot}{ending}")
-        if place.is_file() and filecmp.cmp(place, part, shallow=False):
-            return str(place)
-        if not place.exists():
-            part.rename(place)
-            return str(place)
+        path = folder / (plain if number == 0 else f"{stem}-{number}{dot}{ending}")
+        if path.is_file() and filecmp.cmp(path, part, shallow=False):
+            return str(path)
+        if not path.exists():
+            part.rename(path)
+            return str(path)
     raise WrongUse(f"upload: {folder} holds a thousand files called '{plain}'; remove some")
 
 
 def resolve(settings: WorkbenchSettings, name: str) -> Path:
     """The path of an uploaded file."""
     folder = settings.folder / FOLDER
-    place = Path(name)
-    if place.parent != folder or not place.is_file() or place.is_symlink():
+    path = Path(name)
+    if path.parent != folder or not path.is_file() or path.is_symlink():
         raise WrongUse(f"upload: no uploaded file is called '{name[:80]}'; drop it again")
-    return place
+    return path
 
 
 def reading(settings: WorkbenchSettings, page: UploadPage) -> UploadReading:
-    """The file of a page as it is read: by the process of the reader, one at a time, and kept as long as the file is the same."""
-    place = resolve(settings, page.file)
-    about = place.stat()
+    """The file of a page as it is read: by the process of the reader, one file at a time; cached until the file changes."""
+    path = resolve(settings, page.file)
+    about = path.stat()
     key = (page.model_dump_json(), about.st_size, about.st_mtime_ns)
     if not _looking.acquire(timeout=WAIT_S):
         raise WrongUse("upload: the server reads other files; try again in some minutes")
     try:
         if key not in _looks:
-            _looks[key] = _limited(place, page)
+            _looks[key] = _limited(path, page)
         _looks.move_to_end(key)
         while len(_looks) > KEPT_LOOKS:
             _looks.popitem(last=False)
@@ -141,21 +141,21 @@ def reading(settings: WorkbenchSettings, page: UploadPage) -> UploadReading:
     return found
 
 
-def _limited(place: Path, page: UploadPage) -> UploadReading | TumblelineError:
-    """The reading, or why there is none, which is kept as well."""
+def _limited(path: Path, page: UploadPage) -> UploadReading | TumblelineError:
+    """The reading, or the error that refuses the file; both are cached."""
     try:
-        return in_reader(LOOK, place.name, look, place, page)
+        return in_reader(LOOK, path.name, look, path, page)
     except ReadingEnded as problem:
-        return DataRejected(f"{problem}; or import it with 'tumbleline import {place}'")
+        return DataRejected(f"{problem}; or import it with 'tumbleline import {path}'")
     except TumblelineError as problem:
         return problem.with_traceback(None)
 
 
-def look(place: Path, page: UploadPage) -> UploadReading:
+def look(path: Path, page: UploadPage) -> UploadReading:
     """The file of a page, read by this process."""
     from pipelines.importers import files
 
-    content, source = files.read_content(place)
+    content, source = files.read_content(path)
     table = content.table
     names = tuple(str(column) for column in table.columns)
     plain = UploadReading(
@@ -221,13 +221,13 @@ def imported(request: Mapped[str, Any]) -> dict[str, Any]:
     from pipelines.diagnosis.imported_norms import judge
     from pipelines.importers import files, keep, record
 
-    place = Path(request["file"])
+    path = Path(request["file"])
     how = mapping_of(request)
-    content, source = files.read_content(place)
-    data = record.imported(content.table, how, place.name, content)
+    content, source = files.read_content(path)
+    data = record.imported(content.table, how, path.name, content)
     if data.dwells is None:
         raise DataRejected(
-            f"{place.name}: it has no static interval, dwells are needed; record every pose for some seconds"
+            f"{path.name}: it has no static interval, dwells are needed; record every pose for some seconds"
         )
     judged = judge(request["fit"], data, how) if request["fit"] else None
     run = keep.keep(data, source, how, judged, request["archive"])

@@ -21,7 +21,7 @@ from schemas.station import StationConfig
 
 ReportProgress = Callable[[int, int, str], None]
 MOST_CHARTS = 6
-MOST_EVIDENCE = 80  # findings with a chart of their own
+MOST_EVIDENCE = 80  # findings that have a chart
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
             report_progress(3, steps, "fitting the model before the last step")
             before = residuals_with(condense(dwells), history, model[:-1], units)
     state = made.measured.state
-    known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
+    known = {name: quantity for name, quantity in formula_names().items() if getattr(state, quantity[0]) is not None}
     names = {name: meaning for name, (_, _, meaning) in known.items() if not meaning.startswith("the same")}
     names |= dict.fromkeys(covariates(dwells), "recorded column")
     return Diagnosed(made.document, table, ladder, before, names, views)
@@ -111,12 +111,12 @@ def coefficients(request: Mapping[str, Any], report_progress: ReportProgress) ->
     from pipelines.tables.frames import rows_of
 
     tables: list[pd.DataFrame] = []
-    for number, one in enumerate(request["both"]):
+    for number, side in enumerate(request["both"]):
         report_progress(number, len(request["both"]), "fitting")
-        dwells, history, judged = _inputs(one, "two models")
+        dwells, history, judged = _inputs(side, "two models")
         told = {"kind": "dwell", "out_unit": "g"}  # what a file that lacks them means
-        whole = dwells.assign(**{name: text for name, text in told.items() if name not in dwells})
-        fitted, _, _ = fit_in_memory(LotTables(whole, history), [*(judged or ()), *one["added"]])
+        completed = dwells.assign(**{name: text for name, text in told.items() if name not in dwells})
+        fitted, _, _ = fit_in_memory(LotTables(completed, history), [*(judged or ()), *side["added"]])
         tables.append(fitted["coefficients"])
     return rows_of(changed(tables[0], tables[1], COEFFICIENT, "standard_error"))
 
@@ -202,7 +202,7 @@ def pose_rows(as_it_stands: Recipe, recipe: Recipe) -> list[dict[str, Any]]:
 
 
 def what_if(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """The effect of a model on the lots of the archive; kept there as evidence for its release."""
+    """The effect of a model on the lots of the archive; stored there as evidence for its release."""
     from pathlib import Path
 
     from pipelines.archive import Archive
@@ -239,19 +239,23 @@ def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
         charts["yield"] = pictures.yield_chart(months)
     if archive_audit.due.row.size:
         charts["due"] = pictures.due_chart(archive_audit)
-    plainest = sorted(archive_audit.charts, key=lambda one: one.p_value)[:MOST_CHARTS]
-    moved = sorted((*archive_audit.stations, *archive_audit.slots), key=lambda one: -len(one.changes))[:MOST_CHARTS]
-    charts |= {f"control-{number}": pictures.control_chart(one) for number, one in enumerate(plainest)}
-    charts |= {f"station-{number}": pictures.series_chart(one) for number, one in enumerate(moved)}
+    plainest = sorted(archive_audit.charts, key=lambda chart: chart.p_value)[:MOST_CHARTS]
+    moved = sorted((*archive_audit.stations, *archive_audit.slots), key=lambda series: -len(series.changes))[
+        :MOST_CHARTS
+    ]
+    charts |= {f"control-{number}": pictures.control_chart(chart) for number, chart in enumerate(plainest)}
+    charts |= {f"station-{number}": pictures.series_chart(series) for number, series in enumerate(moved)}
     drifts = enumerate(furthest(archive_audit, MOST_CHARTS))
-    charts |= {f"drift-{number}": pictures.drift_chart(archive_audit, one) for number, one in drifts}
+    charts |= {f"drift-{number}": pictures.drift_chart(archive_audit, drift) for number, drift in drifts}
     listed = findings(archive_audit)
-    evidence = {address_of(one): pictures.evidence_chart(archive_audit, one) for one in listed[:MOST_EVIDENCE]}
+    evidence = {
+        address_of(finding): pictures.evidence_chart(archive_audit, finding) for finding in listed[:MOST_EVIDENCE]
+    }
     return {
         "document": document(archive_audit, listed, request["archive"]),
         "charts": charts,
         "evidence": {name: chart for name, chart in evidence.items() if chart is not None},
-        "addresses": [address_of(one) for one in listed],
+        "addresses": [address_of(finding) for finding in listed],
     }
 
 
@@ -280,7 +284,7 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
 
 
 def address_of(finding: AuditFinding) -> str:
-    """A name of a finding that stays the same as long as the finding does."""
+    """A name of a finding that does not change while the finding remains."""
     words = (finding.kind, finding.subject, str(finding.evidence.get("parameter", finding.evidence.get("figure", ""))))
     return ".".join(word for word in words if word)[:180]
 

@@ -61,9 +61,9 @@ class Acutrol(RecordingEquipment):
         while not self._mounted(wanted):
             if self.clock.now() > end:
                 way = "as marked" if wanted["direction"] > 0.0 else "the other way round"
-                place = f" at {wanted['radius']:g} m" if "radius" in wanted else ""
+                radius = f" at {wanted['radius']:g} m" if "radius" in wanted else ""
                 raise OperatorNeeded(
-                    f"{self.name}: mounting not confirmed in {PATIENCE_S:g} s, units mounted {way}{place} are needed; mount "
+                    f"{self.name}: mounting not confirmed in {PATIENCE_S:g} s, units mounted {way}{radius} are needed; mount "
                     "them, confirm it at the machine and give the command again"
                 )
             self.clock.sleep(POLL_S)

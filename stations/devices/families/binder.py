@@ -19,7 +19,7 @@ class BinderChamber(ThermalChamber):
             refuse_program(self.name, "runs")
 
     def order(self, temperature: float) -> None:
-        """Writes every set point of the controller, because sources disagree on which one belongs to which mode."""
+        """Writes every set point of the controller, because sources disagree on which belongs to which mode."""
         for name in self.written:
             if self._values.has(name):
                 self._values.write(name, temperature)

@@ -63,7 +63,7 @@ def angles_of(vector: Sequence[float]) -> tuple[float, float]:
     """Outer and inner angle, degrees, of the rotation vector (3,) in rad of Rx(outer)·Rz(inner).
 
     Rodrigues: the first row of the matrix is (cos i, −sin i, 0), the last column (0, −sin o, cos o); what the rounding of the
-    registers adds besides is no turn about one of the two axes and is left out.
+    registers adds besides is no turn about either of the two axes and is left out.
     """
     x, y, z = vector
     angle = math.hypot(x, y, z)

@@ -11,7 +11,7 @@ NOMINAL = 1.0  # the memory that holds the nominal setting
 SETTLE_S = 1.0
 FARTHEST = 0.5  # share of the nominal voltage by which an order may differ from it, as procedures may ask
 ABOVE = 0.2  # share above it where the station's file states no absolute maximum
-QUEUE = 50  # errors that are read out of a supply before its first order; the queues of real ones hold 10 to 30
+QUEUE = 50  # errors that are read out of a supply before its first order; the queues of real supplies hold 10 to 30
 REMEDY = "check limits and memory 1 of the supply"
 REACHED = 0.01  # share of the order by which the measured voltage may differ
 RIPPLE_REACHED = 0.02  # of the amplitude of a ripple
@@ -33,7 +33,7 @@ class ScpiSupply(Equipment):
 
         Raises StationRefused: the supply reports an error, its memory 1 holds no voltage, or the order is far from that
             voltage: a recipe that was written for devices with another supply would destroy these.
-        Raises OperatorNeeded: the measured voltage is not the one that was set.
+        Raises OperatorNeeded: the measured voltage is not that which was set.
         """
         self._refuse_beyond(volt, "supplies_V")
         if self._rippled:

@@ -37,15 +37,15 @@ class VibrationController(RecordingEquipment):
     ) -> Recording:
         """A dwell with the motion across an axis (0 to 2), about which the fixture has turned the units by an angle in degrees.
 
-        At 0° the motion is along the next axis (x after z), at 90° along the one after it.
+        At 0° the motion is along the next axis (x after z), at 90° along the axis after that.
 
         Raises RecordingSpoilt, OperatorNeeded: as for :meth:`sine`.
         """
         self.refuse_sine(frequency, level)
         self.write_all(frequency=frequency, level=level, duration=seconds, axis=float(axis), turn=angle_deg)
         recording = self._run("ACROSS", seconds, slots)
-        turn, (one, two) = np.radians(angle_deg), (recording.reference[:, (axis + k) % 3] for k in (1, 2))
-        self._refuse_wrong_sine(one * np.cos(turn) + two * np.sin(turn), frequency, level)
+        turn, (next_axis, after_next) = np.radians(angle_deg), (recording.reference[:, (axis + k) % 3] for k in (1, 2))
+        self._refuse_wrong_sine(next_axis * np.cos(turn) + after_next * np.sin(turn), frequency, level)
         return recording
 
     def random(self, profile: str, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
@@ -86,7 +86,7 @@ class VibrationController(RecordingEquipment):
         return self.recorded(before, slots, "recording of the test")
 
     def _refuse_wrong_sine(self, reference: np.ndarray, frequency: float, level: float) -> None:
-        """Refuse a reference (n,) in g whose extremes are flat, or whose level is not the one that was ordered."""
+        """Refuse a reference (n,) in g whose extremes are flat, or whose level is not that which was ordered."""
         driven = reference - reference.mean()
         self.refuse_flat(np.abs(driven), FLAT_SHARE_OF_SINE * driven.size)
         reached = float(np.sqrt(2.0 * np.mean(driven**2)))

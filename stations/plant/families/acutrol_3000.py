@@ -24,7 +24,7 @@ IDLE_S = 900.0  # without a line for so long the machine stops by itself
 
 
 def radius_error(bench: Bench, radius_m: float) -> float:
-    """Radius of a mounting on the arm minus its nominal one, m: the same for all runs of a station."""
+    """Radius of a mounting on the arm minus its nominal one, m; all runs of a station share it."""
     if math.isclose(radius_m, RADIUS_M, abs_tol=1e-6):
         return bench.rig.arm_radius_error_m
     return HOLE_M * float(stream(bench.station_seed, "bench", "radius", round(1e6 * radius_m)).standard_normal())

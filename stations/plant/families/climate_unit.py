@@ -48,14 +48,14 @@ class Unit:
         return UNKNOWN, False
 
     def _run(self) -> tuple[str, bool]:
-        world, one = self._world, self._set
+        world, orders = self._world, self._set
         self._trouble = "door of the climate unit open" if "controller_abort" in world.bench.conditions else ""
         if self._trouble:
             return "OK", True
         if "missed_trigger" in world.bench.conditions:
             return "OK", True
-        humidity = one["HUM"] or math.nan
-        leg = Leg(one["TEMP"], humidity, one["PRES"], max(1.0, one["CHANGE"]), one["HOLD"])
+        humidity = orders["HUM"] or math.nan
+        leg = Leg(orders["TEMP"], humidity, orders["PRES"], max(1.0, orders["CHANGE"]), orders["HOLD"])
         world.fixture.climate.begin(leg, world.fixture.chamber.air, world.fixture.humidity_now())
         self._number += 1
         self._start_us = world.now_us

@@ -1,4 +1,4 @@
-"""The simulated shock machine behind registers: the same machine as the one with lines of text."""
+"""The simulated shock machine behind registers: the machine is that with lines of text."""
 
 from collections.abc import Callable
 

@@ -42,7 +42,7 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
         return lambda: MOVING if axis.moving(world.now) else DONE
 
     def joints() -> Value:
-        wrist = [math.radians(one.encoder(world.now)) for one in (world.outer, world.inner)]
+        wrist = [math.radians(joint.encoder(world.now)) for joint in (world.outer, world.inner)]
         return [angle % (2.0 * math.pi) for angle in (*SHOULDER_RAD, *wrist)]
 
     sources: dict[str, Source] = {

@@ -10,7 +10,7 @@ from stations.plant.world import World
 def simulated(world: World, profile: Profile) -> Bank:
     """Watlow F4T: a loop that can be switched off, a ramp, no program."""
     chamber = world.fixture.chamber
-    kept: dict[str, Value] = {
+    settings: dict[str, Value] = {
         name: profile.register(name).enumeration[state]
         for name, state in (("ramp_action", "set_point"), ("ramp_scale", "per_minute"))
     }
@@ -25,7 +25,7 @@ def simulated(world: World, profile: Profile) -> Bank:
             chamber.set_point = number(values, "set_point")
         if "ramp_rate" in values:
             chamber.ramp_K_min = number(values, "ramp_rate")
-        store(kept, values)
+        store(settings, values)
 
     def mode() -> Value:
         return "automatic" if chamber.running else "off"
@@ -36,7 +36,7 @@ def simulated(world: World, profile: Profile) -> Bank:
         "mode": mode,
         "actual_mode": mode,
         "manual_power": lambda: 0.0,
-        **stored(kept),
+        **stored(settings),
         "program_state": lambda: "off",
         **{f"event_{n}": lambda: "off" for n in range(1, 5)},
         **{name: lambda: 0 for name in ("program_number", "program_step", "current_program", "current_step")},

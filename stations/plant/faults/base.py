@@ -12,7 +12,7 @@ from stations.plant.world import World
 UNIT = "unit"
 AXES = ("outer", "inner")
 DEVICES = (*AXES, "chamber", "reader")
-MUTE = -1  # in place of an exception code: the device sends no answer
+MUTE = -1  # instead of an exception code: the device sends no answer
 
 Effect = Iterator[None]
 WriteWords = Callable[[list[int]], None]
@@ -28,7 +28,7 @@ class Kind:
     targets : what the fault can be given for: ``unit`` (by its serial number) or the station's devices by name; empty for none
     figures : its figures with their defaults
     effect : changes the world when the fault begins; a generator that yields undoes it when the fault ends
-    exception : code with which the device answers every request, 0 for a normal answer; a figure ``code`` takes its place
+    exception : code with which the device answers every request, 0 for a normal answer; a figure ``code`` replaces it
     on_read : the words that the device reports, from the fault, the time in µs, the address and the true words
     on_write : carries out a write as the faulty device does; the exception code of its answer, from the words of the write, those
         that the registers hold (None where they cannot be read), and the function that writes words to the registers
@@ -50,7 +50,7 @@ KINDS: dict[str, Kind] = {}  # the kinds by name; each module of this folder add
 
 
 def add(*kinds: Kind) -> None:
-    """Adds kinds to the known ones."""
+    """Adds kinds to the known kinds."""
     KINDS.update({kind.name: kind for kind in kinds})
 
 
@@ -68,7 +68,7 @@ def fault(*targets: str) -> Callable[[Callable[..., Effect | None]], None]:
 
 @dataclass
 class Fault:
-    """One fault of one plant, with the figures of its order or their defaults."""
+    """A fault of a plant, with the figures of its order or their defaults."""
 
     order: FaultOrder
     kind: Kind
@@ -96,7 +96,7 @@ class Fault:
         return int(self.figures.get("code", self.kind.exception))
 
     def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
-        """The words that the device reports in place of ``words``."""
+        """The words that the device reports instead of ``words``."""
         return words if self.kind.on_read is None else self.kind.on_read(self, now_us, address, words)
 
     def on_write(self, words: list[int], held: list[int] | None, write: WriteWords) -> int:

@@ -55,7 +55,9 @@ def build_fault(order: FaultOrder, serials: Sequence[str]) -> Fault:
 def _check_target(order: FaultOrder, kind: Kind, serials: Sequence[str]) -> None:
     target = UNIT if order.serial else order.device
     if target not in (kind.targets or ("",)):
-        allowed = ", ".join("serial=…" if one == UNIT else f"device={one}" for one in kind.targets) or "neither"
+        allowed = (
+            ", ".join("serial=…" if target == UNIT else f"device={target}" for target in kind.targets) or "neither"
+        )
         raise RecipeInvalid(
             f"fault {order.kind}: serial '{order.serial}', device '{order.device}'; {allowed} is needed; correct the fault",
             key="faults",

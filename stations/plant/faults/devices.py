@@ -143,7 +143,7 @@ def supply_sag(fault: Fault, world: World, part: float = 0.1) -> Effect:
 
 @fault(UNIT)
 def swapped_slots(fault: Fault, world: World) -> Effect:
-    """A unit and the next one of the lot change places: each slot has the other's serial number and samples."""
+    """A unit and the next unit of the lot are exchanged: each slot has the other's serial number and samples."""
     unit, other, seats = fault.unit, (fault.unit + 1) % len(world.serials), world.seats
     seats[unit], seats[other] = seats[other], seats[unit]
     yield

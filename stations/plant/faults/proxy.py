@@ -27,7 +27,7 @@ CHUNK = 4096
 
 @dataclass(frozen=True)
 class WireAction:
-    """What happens to one frame.
+    """The treatment of a frame.
 
     ``drop`` loses it. ``delay`` delays it and all later frames by ``delay_s``. ``duplicate`` delivers it twice. ``truncate``
     removes its last ``size`` bytes and closes. ``garble`` changes ``size`` bytes. ``half_open``: from here on the connection
@@ -140,7 +140,7 @@ class ChaosProxy:
 
 
 class _Connection:
-    """One client's connection: a thread for each direction."""
+    """The connection of a client: a thread for each direction."""
 
     def __init__(self, proxy: ChaosProxy, client: socket.socket, server: socket.socket) -> None:
         self._proxy = proxy
@@ -161,19 +161,19 @@ class _Connection:
         """Whether both directions have ended; the sockets are closed then."""
         if any(thread.is_alive() for thread in self._ways):
             return False
-        for one in self._sockets:
-            one.close()
+        for connection in self._sockets:
+            connection.close()
         return True
 
     def end(self) -> None:
         """Closes both ends and waits for the threads."""
-        for one in self._sockets:
+        for connection in self._sockets:
             with suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
+                connection.shutdown(socket.SHUT_RDWR)
         for thread in self._ways:
             thread.join(END_S)
-        for one in self._sockets:
-            one.close()
+        for connection in self._sockets:
+            connection.close()
 
     def _pump(self, way: Way, source: socket.socket, sink: socket.socket) -> None:
         """Passes the frames of one direction until either end closes."""
@@ -199,19 +199,19 @@ class _Connection:
     def _hang_up(self) -> None:
         if self._broken:
             return  # a reset is under way: an orderly end would arrive before it
-        for one in self._sockets:
+        for connection in self._sockets:
             with suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
+                connection.shutdown(socket.SHUT_RDWR)
 
     def _break_off(self) -> None:
         """Resets both connections; the reading side is woken first, and the peer receives nothing else."""
         self._broken = True
         self._dead.set()
-        for one in self._sockets:
+        for connection in self._sockets:
             with suppress(OSError):
-                one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                one.shutdown(socket.SHUT_RD)
-            one.close()
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                connection.shutdown(socket.SHUT_RD)
+            connection.close()
 
     def _deliver(self, way: Way, frame: bytes, sink: socket.socket) -> bool:
         """Delivers a frame, changed or not; false ends the connection."""
@@ -235,7 +235,7 @@ class _Connection:
 
 
 def replaced(frame: bytes, action: WireAction, proxy: ChaosProxy) -> list[bytes]:
-    """The frames that are delivered in place of one."""
+    """The frames that are delivered instead of a frame."""
     number = (int.from_bytes(frame[:2], "big") + action.size) % 65536
     by_kind: dict[ActionKind, Callable[[], list[bytes]]] = {
         "drop": list,

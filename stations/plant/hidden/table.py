@@ -66,7 +66,7 @@ ORDERS = (1, 2)
 
 
 class StationErrors(HiddenEffect):
-    """What is wrong with a station and its references until they are recalibrated.
+    """Errors of a station and its references, constant until they are recalibrated.
 
     orthogonality : rad, turn about y between the outer and the inner axis
     thermometer_offset : K; thermometer_slope : K per K from 25 °C; pose_deg : standard deviation at every move
@@ -101,5 +101,5 @@ class StationErrors(HiddenEffect):
         return size * tilted / np.linalg.norm(tilted)
 
     def reading(self, temperature: Array) -> Array:
-        """What the thermometers say of a temperature, °C."""
+        """Reading of the thermometers at a temperature, °C."""
         return temperature + self.thermometer_offset + self.thermometer_slope * (temperature - REFERENCE_C)
