@@ -46,8 +46,8 @@ def verdict(document: DiagnosisDocument) -> str:
         return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
     if named:
         return f"{text}; missing: {', and '.join(named)}."
-    nothing = "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
-    rest = document["reason"] or suspected_text(document) or nothing
+    plain = "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
+    rest = document["reason"] or suspected_text(document) or plain
     if document["unexplained"]:
         rest = f"{document['unexplained']['text']}, and no effect of the catalogue explains it"
     return f"{text}; {rest}."
