@@ -1,4 +1,4 @@
-"""Types of arrays by what their elements are, and where flags stand in a row."""
+"""Types of arrays by what their elements are, where flags stand in a row, and σ by medians."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ Flags = NDArray[np.bool_]
 Index = NDArray[np.int64]
 Places = NDArray[np.intp]
 Texts = NDArray[np.object_]
+
+NORMAL_MEDIAN = 0.6744897501960817
+"""Median of the magnitude of a standard normal value: σ is the median absolute deviation over it (Hampel 1974)."""
 
 
 def runs_of(inside: Flags) -> tuple[Index, Index]:

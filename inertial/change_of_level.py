@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inertial.arrays import Array, Index
+from inertial.arrays import NORMAL_MEDIAN, Array, Index
 
 _MANY_TIMES = 4.0
 """Scatter of a stretch over its noise from neighbouring samples, from which on it is more than one level."""
@@ -40,7 +40,7 @@ def neighbour_noise(x: ArrayLike) -> Array:
     """Standard deviation of white noise (k,) of a record (n, k), from the median size of its first differences."""
     steps = np.abs(np.diff(np.asarray(x, dtype=np.float64), axis=0))
     # of coarse digits most steps may be zero: their mean square, with the largest tenth left out, is none
-    robust = np.median(steps, axis=0) / (0.6745 * np.sqrt(2.0))
+    robust = np.median(steps, axis=0) / (NORMAL_MEDIAN * np.sqrt(2.0))
     smaller = np.sort(steps, axis=0)[: max(1, int(0.9 * len(steps)))]
     return np.maximum(robust, np.sqrt(np.mean(smaller**2, axis=0) / 2.0))
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-from inertial.arrays import Array, Flags, Index, runs_of
+from inertial.arrays import NORMAL_MEDIAN, Array, Flags, Index, runs_of
 from inertial.record_faults import frozen
 
-NORMAL = 0.6745  # median of the magnitude of a standard normal value
 NEIGHBOURS = 7  # samples of the running median
 FAR = 8.0
 """Standard deviations of a sample or of a block's variance that are no chance: 1e-15 of normal ones."""
@@ -122,7 +121,7 @@ def _bursts(far: Flags) -> Flags:
 
 def _spread(values: Array) -> float:
     """Standard deviation of values (n,) by the median of their magnitudes about their median."""
-    return float(np.median(np.abs(values - np.median(values)))) / NORMAL
+    return float(np.median(np.abs(values - np.median(values)))) / NORMAL_MEDIAN
 
 
 def _loud(quick: Array) -> Flags:

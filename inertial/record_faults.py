@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import median_filter
 
-from inertial.arrays import Array, Flags, Index, runs_of
+from inertial.arrays import NORMAL_MEDIAN, Array, Flags, Index, runs_of
 
 _MOST_DISTINCT = 200_000
 _BLOCK = 64  # samples over which the share of equal neighbours is measured
@@ -202,7 +202,7 @@ def _wings(x: Array, step: float) -> tuple[Index, Index, int]:
     """
     away = x - running_median(x)
     blocks = away[: away.size // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
-    spread = np.maximum(1.4826 * np.median(np.abs(blocks), axis=1), step / np.sqrt(12.0))
+    spread = np.maximum(np.median(np.abs(blocks), axis=1) / NORMAL_MEDIAN, step / np.sqrt(12.0))
     calm = np.flatnonzero(spread <= _CALM * np.quantile(spread, 0.25))
     calm_spread = spread[calm, None]
     size = np.abs(blocks[calm])

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inertial.arrays import Array, Flags
+from inertial.arrays import NORMAL_MEDIAN, Array, Flags
 from inertial.criticism.field import Candidates
 from inertial.decisions import MATERIAL, NAMED_BELOW
 from inertial.design import at_rest, resting_grid
@@ -32,9 +32,6 @@ InPart = tuple[tuple[str, tuple[UnseenRange, ...]], ...]
 
 _SCATTER = 5.0
 """Standard deviations of the thermometer within which a reading is the temperature of its soak."""
-
-_TO_SD = 1.4826
-"""Standard deviation of normal values over their median absolute deviation."""
 
 
 def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[tuple[str, ...], InPart]:
@@ -105,7 +102,7 @@ def without_scatter(state: State) -> State:
     inside = np.diff(number) == 0
     if np.count_nonzero(inside) < 2:
         return state
-    scatter = _TO_SD * float(np.median(np.abs(np.diff(read)[inside]))) / np.sqrt(2.0)
+    scatter = float(np.median(np.abs(np.diff(read)[inside]))) / (NORMAL_MEDIAN * np.sqrt(2.0))
     levels = np.array([np.median(read[number == k]) for k in np.unique(number)])
 
     def level(values: Array) -> Array:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import NORMAL_MEDIAN, Array
 from inertial.discovery.running_sums import FIRST, Scale, Sums
 from inertial.discovery.station_wander import over
 
@@ -72,7 +72,7 @@ class Correlations:
 
 def _evidence(increments: Array) -> Array:
     """Logarithm of the evidence (h,) of increments (lots, h), each bounded by what came before; medians begin."""
-    spread = 1.4826 * np.median(np.abs(increments[:FIRST]), axis=0)
+    spread = np.median(np.abs(increments[:FIRST]), axis=0) / NORMAL_MEDIAN
     scale = Scale(np.where(spread > 0.0, spread, 1.0))
     sums = Sums.of(increments.shape[1], two_sided=True)
     for x in increments:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import NORMAL_MEDIAN, Array
 from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
 from inertial.discovery.station_wander import over
 
@@ -132,7 +132,7 @@ def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float
         within.append(np.mean(left**2 / np.where(free > 0.0, free, np.nan), axis=0))
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # an effect that no lot shows is nan for all of them
-        many = np.nanmedian(np.clip(np.array(between), 0.0, np.nanquantile(between, 0.99)), axis=0) / 0.455
+        many = np.nanmedian(np.clip(np.array(between), 0.0, np.nanquantile(between, 0.99)), axis=0) / NORMAL_MEDIAN**2
         few = np.nanmedian(np.array(within), axis=0)
     return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtr
 
-from inertial.arrays import Array, Flags, Places
+from inertial.arrays import NORMAL_MEDIAN, Array, Flags, Places
 from inertial.discovery.running_sums import BOUND, FIRST, Levels, Scale, Sums
 from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander, over
 
@@ -162,7 +162,7 @@ class Evidence:
         with np.errstate(all="ignore"):
             there = seen.any(axis=0)
             centre = np.where(there, np.nanmedian(np.where(there, z, 0.0), axis=0), 0.0)
-            spread = 1.4826 * np.nanmedian(np.abs(np.where(there, z, 0.0) - centre), axis=0)
+            spread = np.nanmedian(np.abs(np.where(there, z, 0.0) - centre), axis=0) / NORMAL_MEDIAN
         start = np.where(there & (spread > 0.0), spread, 1.0)
         about_zero = np.where(there, np.hypot(spread, centre), 1.0)
         self._scales = {"between": Scale(start), "mean": Scale(np.where(about_zero > 0.0, about_zero, 1.0))}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-from inertial.arrays import Array, Index, runs_of
+from inertial.arrays import NORMAL_MEDIAN, Array, Index, runs_of
 from inertial.dynamics.pulses import HALF_WIDTH, low_passed, span
 
 FINE, CLOSE = 24.0, 12
@@ -106,7 +106,7 @@ def other_pulses(record: Array, rate_hz: float, duration_s: float) -> tuple[list
     """
     rest = float(np.median(record))
     y = low_passed(record - rest, rate_hz, duration_s)
-    noise = 1.4826 * float(np.median(np.abs(y)))
+    noise = float(np.median(np.abs(y))) / NORMAL_MEDIAN
     size = np.abs(y)
     top, lasting = int(np.argmax(size)), max(round(duration_s * rate_hz), 1)
     limit = max(OTHER * size[top], 8.0 * noise)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, lfilter, sosfiltfilt
 
-from inertial.arrays import Array
+from inertial.arrays import NORMAL_MEDIAN, Array
 from inertial.dynamics.spectra import STANDARD_GRAVITY
 from inertial.errors import NotIdentified
 
@@ -133,7 +133,7 @@ def found_duration(record: Array, rate_hz: float) -> tuple[float, float]:
         No pulse stands out of the noise, it begins with the record, or its widths at 10 and at 50 % are not those of a half sine.
     """
     plain = record - np.median(record)
-    noise = 1.4826 * float(np.median(np.abs(plain)))
+    noise = float(np.median(np.abs(plain))) / NORMAL_MEDIAN
     y, duration = plain, 0.0
     for _ in range(30):
         y = y if y[np.argmax(np.abs(y))] > 0.0 else -y

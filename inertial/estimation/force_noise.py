@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from inertial.arrays import Array, Places
+from inertial.arrays import NORMAL_MEDIAN, Array, Places
 from inertial.estimation.alternative import soaks
 from inertial.estimation.comparison import estimate
 from inertial.estimation.loudness import TOGETHER, inner_mean
@@ -37,9 +37,6 @@ _LEAST = 0.03
 """Part of the white variance of an axis that a dwell has at the least."""
 
 _ROUNDS = 5
-
-_MEDIAN = 0.455
-"""Median of the square of a normal number of variance one."""
 
 
 def by_force(model: Model, soak: Places | None = None) -> Array | None:
@@ -138,7 +135,7 @@ def _capped(ratio: Array, along: Array) -> Array:
     middle = np.array(
         [np.median(ratio[classes == k]) if np.any(classes == k) else np.inf for k in range(len(_EDGES) + 1)]
     )
-    return _FAR * middle[classes] / _MEDIAN
+    return _FAR * middle[classes] / NORMAL_MEDIAN**2
 
 
 def _curve(along: Array, ratio: Array, at: Array) -> Array:

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import NORMAL_MEDIAN, Array
 from inertial.decisions import TOGETHER, UNITS_TOGETHER
 from inertial.design import of_axes
-from inertial.distributions import chi2_quantile
 from inertial.estimation.alternative import Handling, by_block, pose_errors
 from inertial.estimation.bases import unit_columns
 from inertial.estimation.comparison import estimate, residuals
@@ -24,7 +23,6 @@ from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 from inertial.probability import log_chi2_tail
 
-_MEDIAN = float(chi2_quantile(0.5, 1.0))
 _FEWEST_POSES = 10
 _QUANTILES = (0.5, 0.75, 0.9)
 """Of the poses, at which their scatter is compared with that of the noise: a table may be off in a part of its poses only."""
@@ -118,7 +116,7 @@ def shared_noise(model: Model) -> float:
     if squares.size < 10:
         return 1.0
     lost = space.dof / max(int(model.problem.covariance.count.sum()), 1)
-    phi = float(np.median(squares)) / _MEDIAN / max(lost, 0.1)
+    phi = float(np.median(squares)) / NORMAL_MEDIAN**2 / max(lost, 0.1)
     return phi if phi > 1.0 + TOGETHER * 2.33 / np.sqrt(squares.size) else 1.0
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from inertial.arrays import Array
-from inertial.population.memory import TO_SIGMA, drawn_in, innovations, memories_of, memory_of
+from inertial.arrays import NORMAL_MEDIAN, Array
+from inertial.population.memory import drawn_in, innovations, memories_of, memory_of
 
 FEWEST = 4  # points on either side
 LIKELY = (
@@ -98,7 +98,7 @@ def noise_of(values: Array) -> float:
     if values.size < 3:
         return 0.0
     steps = np.diff(values)
-    middle = TO_SIGMA * float(np.median(np.abs(steps)))
+    middle = float(np.median(np.abs(steps))) / NORMAL_MEDIAN
     drawn_in = float(np.sqrt(np.mean(np.clip(steps, -DRAWN_IN * middle, DRAWN_IN * middle) ** 2)))
     return max(middle, drawn_in) / np.sqrt(2.0)
 

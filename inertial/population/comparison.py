@@ -7,8 +7,7 @@ from scipy.stats import chi2, median_abs_deviation, norm, rankdata, tiecorrect
 from scipy.stats import f as f_distribution
 from scipy.stats import t as student
 
-from inertial.arrays import Array, Index
-from inertial.population.memory import TO_SIGMA
+from inertial.arrays import NORMAL_MEDIAN, Array, Index
 
 COVERAGE = 2.0
 MAD_EFFICIENCY = 0.37  # Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88, 1273
@@ -71,7 +70,7 @@ def holm(p_values: Array) -> Array:
 
 def sigma_of(values: Array) -> Array:
     """σ by the median absolute deviation along the first axis of values (n, …); NaN is left out."""
-    return np.asarray(median_abs_deviation(values, axis=0, scale=1.0 / TO_SIGMA, nan_policy="omit"))
+    return np.asarray(median_abs_deviation(values, axis=0, scale=NORMAL_MEDIAN, nan_policy="omit"))
 
 
 def robust_z(values: Array) -> Array:

@@ -5,7 +5,7 @@ from scipy.ndimage import median_filter
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from inertial.arrays import Array
+from inertial.arrays import NORMAL_MEDIAN, Array
 
 MOST = 0.9  # correlation of neighbours beyond which a level and a wander are the same thing
 LARGEST = 0.97  # correlation that is considered at all
@@ -20,7 +20,6 @@ FEWEST = 4  # points on either side of a change
 TAILS = (np.inf, 8.0, 5.0, 3.0)
 """Degrees of freedom of Student's distribution that innovations are compared with."""
 SURELY = 2.0  # by which the log-likelihood of a heavier tail must be better
-TO_SIGMA = 1.4826  # σ over the median absolute deviation of a normal value
 
 
 def drawn_in(values: Array) -> Array:
@@ -29,7 +28,7 @@ def drawn_in(values: Array) -> Array:
         return values
     level = _running_median(values)
     left = values - level
-    sigma = TO_SIGMA * float(np.median(np.abs(left)))
+    sigma = float(np.median(np.abs(left))) / NORMAL_MEDIAN
     return level + np.clip(left, -DRAWN_IN * sigma, DRAWN_IN * sigma) if sigma > 0.0 else values
 
 
@@ -87,7 +86,7 @@ def tail_of(values: Array, memory: float) -> float:
     """Degrees of freedom of the innovations of a series (n,): infinite unless heavier tails are surely better."""
     level = _running_median(values) if values.size >= LOCAL else np.full_like(values, np.median(values))
     left = values - level if memory == 0.0 else np.diff(values)
-    sigma = TO_SIGMA * float(np.median(np.abs(left)))
+    sigma = float(np.median(np.abs(left))) / NORMAL_MEDIAN
     if not sigma > 0.0:
         return np.inf
     scales = sigma * np.geomspace(0.6, 1.8, 12)

@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from inertial.arrays import Array, Flags, Index, Texts
+from inertial.arrays import NORMAL_MEDIAN, Array, Flags, Index, Texts
 from inertial.population.capability import Index as Capability
 from inertial.population.capability import cpk, fraction_interval, independent, shape_of, sigma_within
 from inertial.population.comparison import Comparison, compare, holm, outlier_limit, robust_z, unlike
-from inertial.population.memory import TO_SIGMA
 from inertial.population.two_way import group_medians
 from pipelines.audit.calibrations import Calibrations, codes, date_of
 from pipelines.audit.drifts import OF_UNIT
@@ -224,7 +223,7 @@ def _error_of_lots(values: Array, lot: Index) -> Array:
     counts = np.bincount(lot)
     middles = np.stack([group_medians(column, lot) for column in values.T], axis=1)
     freed = (values - middles[lot]) * np.sqrt(counts / np.maximum(counts - 1, 1))[lot, None]
-    inside = TO_SIGMA * np.nanmedian(np.abs(freed[counts[lot] > 1]), axis=0)
+    inside = np.nanmedian(np.abs(freed[counts[lot] > 1]), axis=0) / NORMAL_MEDIAN
     return MEDIAN_OVER_MEAN * inside / np.sqrt(counts)[:, None]
 
 

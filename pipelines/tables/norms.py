@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.arrays import NORMAL_MEDIAN
 from inertial.data_errors.readings import Readings
 from inertial.errors import NotIdentified
 from inertial.estimation.problem import Lot
@@ -131,7 +132,7 @@ def _far(readings: Readings, unit: int, fit: EllipsoidFit, used: NDArray[np.bool
     left = np.zeros(used.size)
     there = readings.there[unit]
     left[there] = np.abs(np.linalg.norm(fit.apply(readings.output[unit, there], heat), axis=1) - 1.0)
-    typical = float(np.median(left[used])) / 0.6745
+    typical = float(np.median(left[used])) / NORMAL_MEDIAN
     worst = int(np.argmax(np.where(used, left, 0.0)))
     far = np.zeros(used.size, dtype=bool)
     far[worst] = left[worst] > _FAR * typical
