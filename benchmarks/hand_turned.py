@@ -204,10 +204,12 @@ def judged(name: str, frame: pd.DataFrame) -> dict[str, bool]:
     physics = [set(g["effects"]) for g in document["classes"] if g.get("scope") != "data"]
     right = EFFECTS[name][3]
     if not right:
-        return {"named": bool(physics), "not adequate": document["adequate"] is False}
+        suspected = document["suspected"] is not None
+        return {"named": bool(physics), "not adequate": document["adequate"] is False, "suspected": suspected}
     return {
         "in class": any(right & one for one in physics),
         "recommended": bool(right & set(document["recommended"])),
+        "suspected": bool(document["suspected"] and right & set(document["suspected"]["effects"])),
         "another effect named": any(not right & one for one in physics),
     }
 
