@@ -158,19 +158,20 @@ def print_next(lines: Sequence[str]) -> None:
 
 
 def print_next_of_diagnosis(document: DiagnosisDocument, find: FindData, model: Path | None) -> None:
-    """Print the commands after a diagnosis: the recipe that decides, and the effects that are added, or the formula to judge.
+    """Print the commands after a diagnosis: the recipe that decides; the effects that are added, the suspect or formula to judge.
 
     find : gives the data; called only where there is something to do: to look for a fresh run takes a second
     model : the model file that was judged; None for a list of effects
     """
     steps = (row for row in document["next_measurements"] if row.get("measurable", True))
     decides = any(not row["why"].startswith(UNSEEN) for row in steps)
-    if not (document["recommended"] or document["offer"] or decides):
+    suspected = document["suspected"]
+    if not (document["recommended"] or document["offer"] or suspected or decides):
         return
     data = find()
     lines: list[str] = []
+    model_option = ["--model", str(model)] if model else ["--effects", ",".join(document["effects"])]
     if decides and data.refusal is not None:  # dwells of a file do not state the recipe that they were measured with
-        model_option = ["--model", str(model)] if model else ["--effects", ",".join(document["effects"])]
         lines.append(command_line("diagnose", data.source, *model_option, *data.options, "--output", free_name("next")))
     elif decides:
         say(
@@ -179,6 +180,9 @@ def print_next_of_diagnosis(document: DiagnosisDocument, find: FindData, model: 
         )
     if document["recommended"]:
         lines += _extension(document, data, model)
+    elif suspected:
+        added = ["--effect", suspected["effects"][0]]
+        lines.append(command_line("improve", data.source, *model_option, *data.options, *data.again, *added))
     elif offer := document["offer"]:  # judges the model with the formula, without a model file
         words = ["--effects", ",".join([*document["effects"], offer["id"]])]
         words += ["--formula", f"{offer['id']}={'; '.join(offer['columns'])}", *data.given.written, *data.options]

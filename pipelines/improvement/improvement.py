@@ -104,7 +104,7 @@ class Improvement:
         before = self._diagnosis(judged, first=True)
         choices = self._choices(before, named, yes=yes)
         added = [choice["effect"] for choice in choices if choice["added"]]
-        versions, text = self._versions(before["effects"], added, choices)
+        versions, text = self._versions(before, added, choices)
         after = before
         if added:
             self.attendant.begins_again(added)
@@ -158,6 +158,9 @@ class Improvement:
             An effect of --effect is in no class, two are in one class, or standard input ended before an answer.
         """
         classes = [g["effects"] for g in diagnosis["classes"] if set(g["effects"]) & set(diagnosis["recommended"])]
+        suspected = (diagnosis["suspected"] or {"effects": []})["effects"]
+        if set(named) & set(suspected):
+            classes = [suspected]  # where one is suspected, none is recommended
         known = [name for members in classes for name in members]
         for name in named:
             if not known:
@@ -191,16 +194,17 @@ class Improvement:
         return "question", self.attendant.agrees(effect, others, self.target)
 
     def _versions(
-        self, effects: list[str], added: list[str], choices: list[ImprovementChoice]
+        self, diagnosis: DiagnosisDocument, added: list[str], choices: list[ImprovementChoice]
     ) -> tuple[list[Version], str]:
         """The model that was judged and one version per added effect; the text of the model file, empty without a change."""
         from pipelines.jobs.model_files import Version, model_step, model_text, versions
 
+        effects, found = diagnosis["effects"], "suspects" if diagnosis["suspected"] else "names"
         judged = Version(1, tuple(effects), (), (), None)
         if not added:
             return [judged], ""
         others = {choice["effect"]: choice["not_separated_from"] for choice in choices}
-        steps = [model_step(name, self._reason(others[name]), self.by, self.data) for name in added]
+        steps = [model_step(name, self._reason(others[name], found), self.by, self.data) for name in added]
         text = model_text(self.model) if self.model else self._begun(effects, steps[0])
         text, model = with_effects(text, steps, self.target)
         return (versions(model)[-len(added) - 1 :] if model else [judged]), text
@@ -219,9 +223,9 @@ class Improvement:
             )
         return new_model(self.target, effects, step.by, step.at)
 
-    def _reason(self, others: list[str]) -> str:
+    def _reason(self, others: list[str], found: str) -> str:
         alone = f"; these data do not separate it from {', '.join(others)}" if others else ""
-        return f"a diagnosis of {Path(self.data).name} names it{alone}"
+        return f"a diagnosis of {Path(self.data).name} {found} it{alone}"
 
     def _rows(self, versions: list[Version], noise: float | None, given: ImprovedTables) -> list[LadderRow]:
         """Errors of each version; none where no unit can be judged."""

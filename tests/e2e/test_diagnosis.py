@@ -22,6 +22,7 @@ from pipelines.jobs.recipes import load_recipe
 from schemas.errors import RecipeInvalid
 
 from physics import OUTSIDE  # isort: skip
+from benchmarks.hand_turned import make as turned_by_hand
 from benchmarks.truth import Spec, case, make_run
 
 from world import World, make  # isort: skip
@@ -155,6 +156,18 @@ def test_what_no_physics_explains_is_offered_as_a_formula_that_then_explains_it(
     assert document_of("extend", model, document["offer"]["id"])["effects"][-1] == "humidity_pct_bias"
     assert document_of("compare", dwells, "--model", model)["rms_ug"] < 0.6 * document["error"]["rms_ug"]
     text_of("extend", tmp_path / "other.toml", "covariate:humidity_pct", status=0)
+
+
+def test_an_effect_that_is_suspected_is_added_where_it_is_asked_for(tmp_path: Path) -> None:
+    dwells, model = tmp_path / "dwells.csv", tmp_path / "model.toml"
+    turned_by_hand("hysteresis", 9101).to_csv(dwells, index=False)
+    words = printed_commands(given("diagnose", dwells)[1])[-1]
+    assert (words[0], words[-2:]) == ("improve", ["--effect", "thermal_hysteresis"])
+    document = document_of(*words, "--output", model, status=0)
+    assert document["added"] == ["thermal_hysteresis"]
+    assert document["ladder"][-1]["fitted_ug"] < 0.2 * document["ladder"][0]["fitted_ug"]
+    assert document["ladder"][-1]["confirmed"] is None  # these dwells do not decide it
+    assert "suspects it" in model.read_text(encoding="utf-8")
 
 
 OF_NO_CATALOGUE = {
