@@ -152,7 +152,7 @@ REFUSED_BY_RUN = {
     'units = ["A1"]\n[stop]\nvisible = ["thermal_histeresis"]\n': "stop.visible: unknown effect 'thermal_histeresis'",
     "[stop]\nbias_ug = 1.0\n": "[stop] asks for U = 1 µg of bias, the references alone have U = ",
     'limits = "consumr"\n': "no file and no built-in limits are called 'consumr'",
-    "seed = 1\nlimits = \"consumer\"\n": "verification_norm_ug, verification_ratio, bias_error_ug need verification poses",
+    'seed = 1\nlimits = "consumer"\n': "verification_norm_ug, verification_ratio, bias_error_ug need verification poses",
     "sensor_axes = 1\n": "sensor_axes: 1 of device ADXL355, its digital output sends 3",
     "static_record_s = 60.0\nstatic_temperature_C = 300.0\n": "key 'static_temperature_C': 300 °C, the chamber",
 }

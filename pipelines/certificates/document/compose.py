@@ -21,7 +21,7 @@ from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.numbers import probability, significant
 from pipelines.certificates.entries import STATIC
 from pipelines.certificates.ledger import stated
-from pipelines.certificates.measured import measured_on, measured_span
+from pipelines.certificates.measured import measured_on, measured_span, same_measurement
 from pipelines.certificates.stated_budget import Row, StatedBudget, edge, stated_budget
 from pipelines.procedures import FIGURES as OF_PROCEDURES
 from pipelines.stages.figures import FIGURES
@@ -129,7 +129,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         limits=str((about.get("limits") or {}).get("name", "")),
         grade_statement=_grade_statement(budget, event.grade),
         adjustment=adjustment(run, calibration, known) if static else NOT_ADJUSTED,
-        amendment=_amendment(calibration, known),
+        amendment=_amendment(run, calibration, known),
         interval=f"As agreed with the customer, the next calibration is due on {calibration.stated_until}."
         if budget.customer_agreed
         else "",
@@ -239,9 +239,10 @@ def _grade_statement(budget: StatedBudget, grade: str) -> str:
     )
 
 
-def _amendment(one: Calibration, known: list[Calibration]) -> content.Amendment:
-    """A certificate of the same run that this one ended, or that was revoked before: its amendment; one that ended this one."""
-    earlier = [old for old in known if old.run == one.run and old.event.sequence < one.event.sequence]
+def _amendment(run: Run, one: Calibration, known: list[Calibration]) -> content.Amendment:
+    """What a certificate amends: one of the same measurement that it ended, or that was revoked before; and what ended it."""
+    before = [old for old in known if old.event.sequence < one.event.sequence]
+    earlier = [old for old in before if same_measurement(run, old.run)]
     ended = [old.certificate for old in earlier if old.event.sequence in one.event.ends]
     alike = [old for old in earlier if one.event.ends_others_of(old.event)][-1:]
     ended = ended or [old.certificate for old in alike if old.withdrawn and one.event.reason]

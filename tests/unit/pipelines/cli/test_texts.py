@@ -46,7 +46,9 @@ def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypat
         ("static_record_s = 30.0", "static_record_s = 0.0"),
         name="blind.toml",
     )
-    with pytest.raises(RecipeInvalid, match=r"bias_error_ug\S* need verification poses; .* needs? a static record") as by_run:
+    with pytest.raises(
+        RecipeInvalid, match=r"bias_error_ug\S* need verification poses; .* needs? a static record"
+    ) as by_run:
         Request(blind).job(Archive(tmp_path / "archive"))
     assert str(by_run.value) in refused(["plan", blind], tmp_path, monkeypatch)  # every limit, in the words of the run
     units = load_recipe(recipe).units
