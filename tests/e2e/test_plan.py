@@ -172,8 +172,17 @@ PLAIN_WORDS = {
     (
         'poses = "six"',
         "poses = [[0, 0], [90]]",
-    ): "key 'poses.1', number 2: found [90]: the two angles [outer, inner] of a pose",
-    ('poses = "six"', "poses = [[0, 0], [4000, 0]]"): "key 'poses.1.0', number 2: found 4000",
+    ): "key 'poses', number 2: found [90]: the two angles [outer, inner] of a pose",
+    ('poses = "six"', "poses = [[0, 0], [4000, 0]]"): "key 'poses', number 2.1: found 4000",
+    ("[25.0]", '[25.0, "warm"]'): "key 'temperatures_C', number 2: found 'warm'",
+    (
+        "[25.0]",
+        '[25.0]\nfaults = [{kind = "a"}, {kinds = "b"}]',
+    ): "unknown key 'faults.kinds', number 2; did you mean kind",
+    (
+        "[25.0]",
+        '[25.0]\nprocedures = [{kind = "tilt"}, {kind = "rotation", rates_deg_s = [1, "fast"]}]',
+    ): "procedures, number 2 (rotation): key 'rates_deg_s', number 2: found 'fast'",
     ("[25.0]", "[]"): "key 'temperatures_C': found []: 1 or more entries are needed",
     ('"faces"', '""'): "key 'name': found '': 1 or more characters are needed",
     ("[25.0]", '[25.0]\nprocedures = ["rotation"]'): 'write [[procedures]], and below it kind = "rotation"',
