@@ -1,6 +1,7 @@
 """TOML files that people write: bounded reading, parsing, and the first problem of a model as one message."""
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -82,15 +83,21 @@ def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> Re
         key=lambda d: (d["type"] != "extra_forbidden", d["type"] == "string_type" and isinstance(d["input"], list)),
     )
     first = details[0]
-    key = shown(".".join(str(part) for part in first["loc"] if not _is_branch(part)))
+    location = [part for part in first["loc"] if not _is_branch(part)]
+    key = shown(".".join(map(str, location)))
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, first["loc"][:-1])
         wrong = str(first["loc"][-1])
-        message = f"{source}: unknown key '{key}'; {did_you_mean(wrong, known)}"
+        message = f"{source}: unknown key {_named(location)}; {did_you_mean(wrong, known)}"
         return RecipeInvalid(message, key=key, close=close_matches(wrong, known))
-    numbers = [part for part in first["loc"] if isinstance(part, int)]
-    entry = f", number {numbers[0] + 1}" if numbers and first["loc"][0] == "poses" else ""
-    return RecipeInvalid(f"{source}: {_sentence(first, key, entry)}", key=key)
+    return RecipeInvalid(f"{source}: {_sentence(first, _named(location))}", key=key)
+
+
+def _named(location: Sequence[int | str]) -> str:
+    """A key by its names and the numbers, from 1, in the lists on the way: ``'faults.kind', number 2``; empty for the file."""
+    names = ".".join(part for part in location if isinstance(part, str))
+    numbers = ".".join(str(part + 1) for part in location if isinstance(part, int))
+    return f"'{shown(names)}'{f', number {numbers}' if numbers else ''}" if location else ""
 
 
 def _is_branch(part: object) -> bool:
@@ -98,17 +105,17 @@ def _is_branch(part: object) -> bool:
     return isinstance(part, str) and (part == "str" or "[" in part)
 
 
-def _sentence(detail: ErrorDetails, key: str, entry: str) -> str:
+def _sentence(detail: ErrorDetails, key: str) -> str:
     if detail["type"] == "missing":
-        return f"key '{key}' is missing; add it"
+        return f"key {key} is missing; add it"
     reason = shown(reason_of(detail), LONGEST_REASON)
     if not key:
         return reason
     value = detail["input"]
     if isinstance(value, dict) or (isinstance(value, list) and (value or detail["type"] == "value_error")):
-        return f"key '{key}'{entry}: {reason}"
+        return f"key {key}: {reason}"
     text = f"'{shown(value)}'" if isinstance(value, str) else shown(value)
-    return f"key '{key}'{entry}: found {text}: {reason[:1].lower()}{reason[1:]}"
+    return f"key {key}: found {text}: {reason[:1].lower()}{reason[1:]}"
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:

@@ -1,9 +1,24 @@
-"""Start and end of the measurement of a run."""
+"""The measurement that a run analyses: which it is, its start and its end."""
 
 from pipelines.archive import Run, files
 from pipelines.certificates.days import day_of
 
 START, END = "run.json", "readings.json"
+
+
+def measurement_of(run: Run) -> str:
+    """What all analyses of one measurement have in common: its capture, else the file that it was imported from, else the run."""
+    about = run.about
+    source = (about.get("source") or {}).get("sha256")
+    return str(about.get("capture") or source or about.get("rerun_of") or run.id)
+
+
+def same_measurement(run: Run, other: str) -> bool:
+    """Whether another run of the archive analyses the measurement of this one; False where the archive lacks it."""
+    if other == run.id:
+        return True
+    its = Run(run.archive, other)
+    return (its.path / START).is_file() and measurement_of(its) == measurement_of(run)
 
 
 def measured_span(run: Run) -> tuple[str, str] | None:

@@ -12,7 +12,7 @@ from inertial.uncertainty.rounding import equal
 from pipelines.archive import Archive, Run
 from pipelines.certificates.entries import LedgerEntry
 from pipelines.certificates.ledger import Ledger
-from pipelines.certificates.measured import END, measured_span
+from pipelines.certificates.measured import END, measured_span, same_measurement
 from pipelines.integrity import verify
 from pipelines.jobs.adequacy import adequacy_of
 from pipelines.jobs.references import contradiction, references_of
@@ -67,18 +67,19 @@ def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
             )
 
 
-def withdrawn(ledger: Ledger, event: LedgerEntry) -> str:
-    """Why a unit is not certified again without a reason of its own: its last certificate of this run was revoked; else empty."""
-    known = [
-        calibration
-        for calibration in ledger.calibrations(event.serial)
-        if calibration.run == event.run and event.ends_others_of(calibration.event)
-    ]
-    if not known or not known[-1].withdrawn:
+def withdrawn(ledger: Ledger, run: Run, event: LedgerEntry) -> str:
+    """Why a unit is not certified without a reason of its own, else empty: its last certificate of these data was revoked.
+
+    Another analysis of data that were found wrong is as wrong; whether they were, or the model was, only the laboratory knows.
+    """
+    known = [earlier for earlier in ledger.calibrations(event.serial) if event.ends_others_of(earlier.event)]
+    last = next((earlier for earlier in reversed(known) if same_measurement(run, earlier.run)), None)
+    if last is None or not last.withdrawn or last.ended_by is None:
         return ""
+    whose = "this run" if last.run == run.id else f"run {last.run}, which has the same measurements,"
     return (
-        f"certificate {known[-1].certificate} of this run was revoked ({known[-1].reason}); measure the unit again, or, if the "
-        f"revocation was an error, certify it with --units {event.serial} --reason TEXT"
+        f"certificate {last.certificate} of {whose} was revoked on {last.ended_by.when[:10]} ({last.reason}); measure the unit "
+        f"again, or, if its measurements are right, certify it with --units {event.serial} --reason TEXT"
     )
 
 

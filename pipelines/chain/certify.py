@@ -78,7 +78,7 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     units : serials; every unit of the run that passed where empty.
     start : first day, today where empty.
     until : day after the last, so many ``months`` after the first where empty, as many as are allowed where that is 0.
-    reason : kept with the events; a unit whose certificate of this run was revoked needs its name and a reason
+    reason : kept with the events; units whose certificate of these data was revoked are certified again only by name, with one
     supersede : end calibrations that begin later and overlap, too.
     keys : trusted public keys; that of the configured private key where None. Where there are keys, one must have signed the run.
 
@@ -102,7 +102,9 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     # one at a time from here on: of two who certify one serial at the same moment the second is refused, and learns of the first
     with alone(ledger.root / FOLDER, wait=True):
         if not (units and reason.strip()):
-            result.left_out |= {proposal.serial: why for proposal in proposals if (why := withdrawn(ledger, proposal))}
+            result.left_out |= {
+                proposal.serial: why for proposal in proposals if (why := withdrawn(ledger, run, proposal))
+            }
             proposals = [proposal for proposal in proposals if proposal.serial not in result.left_out]
             if units and result.left_out:
                 serial, why = next(iter(result.left_out.items()))
@@ -116,6 +118,16 @@ def certify(  # noqa: PLR0913 - each is an option of the command
             (result.there if was_there else result.written).append(event)
         ledger.anchor(result.written)
     return result
+
+
+def offered(ledger: Ledger, run: Run) -> bool:
+    """Whether :func:`certify` would give a unit of a finished run a certificate from today on, signatures apart."""
+    first = today()
+    try:
+        refuse_period(run, first, last := months_after(first, allowed_months(run)))
+        return any(not withdrawn(ledger, run, one) for one in _proposals(run, (), first, last, "")[0])
+    except WrongUse:
+        return False
 
 
 def _proposals(

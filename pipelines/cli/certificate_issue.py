@@ -41,8 +41,9 @@ def issue(
 
     The run is verified first; a run with changed files is not certified. An earlier calibration of a unit ends on the day on
     which the new one begins, so that a unit has one valid calibration on each day. A unit whose certificate was revoked is not
-    certified again from the same run, unless --units and --reason say so. The report of the run is made again and names the
-    certificates. Exit status 1: some units of the run have no certificate: they did not pass, or theirs was revoked.
+    certified again from the same measurements, by this run or a re-run, unless --units and --reason say so. The report of the
+    run is made again and names the certificates. Exit status 1: some units of the run have no certificate: they did not pass, or
+    theirs was revoked.
     """
     from pipelines.archive.signatures import public_keys
     from pipelines.certificates import Ledger

@@ -125,15 +125,14 @@ def refuse_recorded(jobs: list[Job], store: Archive, *, replays: bool) -> None:
 
 def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
     """The commands after a run: what its model lacks or its plan cannot show, and its certificates where they can be given."""
+    from pipelines.certificates import Ledger
+    from pipelines.chain.certify import offered
     from pipelines.cli.next_commands import archive_words, command_line
 
     words = [run.id, *archive_words(archive)]
     lines = [command_line("diagnose", *words)] if document["adequacy"] is not None else []
-    adequate = document["adequacy"] is None or document["adequacy"]["adequate"] is not False
-    certain = adequate and any(
-        unit["outcome"] == "pass" and unit.get("basis") == "budget" for unit in document["units"]
-    )
-    return [*lines, command_line("certificate", "issue", *words)] if certain else lines
+    issues = offered(Ledger(run.archive.root), run)
+    return [*lines, command_line("certificate", "issue", *words)] if issues else lines
 
 
 def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -> Run:

@@ -66,7 +66,8 @@ class InspectDocument(TypedDict):
     intervals: list[IntervalDocument]
     open: Annotated[list[str], "values that the file does not state and the command lacks"]
     command: Annotated[
-        str, "the proposed command: `import`, or `diagnose` for a table of dwells in the exchange format"
+        str,
+        "the proposed command: `import`, `diagnose` for a table of dwells in the exchange format, `plan` for angles alone",
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -20,14 +20,20 @@ from pipelines.importers import values
 from pipelines.importers.content import Content, unit_in
 from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument, SampleFaultDocument
 from pipelines.importers.exchange import read_dwells
-from pipelines.importers.guesses import EXCHANGE, Guesses, measurable
+from pipelines.importers.guesses import EXCHANGE, Guess, Guesses, measurable
 from pipelines.importers.proposal import serial_of
 from pipelines.importers.recognition import Recognition, recognise
 from pipelines.importers.stretches import Stops
-from schemas.errors import TumblelineError
+from pipelines.importers.transfer_columns import PointsLayout, meanings_of_points, transfer_points
+from schemas.errors import DataRejected, TumblelineError
 
 _MOST_INTERVALS = 2000
 _NO_REST = "no position at rest was found: an import keeps the record, without dwells"
+_POSES = (
+    "the output in each pose: angles of the table alone are no measurement; to measure there, write them into a recipe, "
+    "poses = [[outer, inner], …], and see what they determine"
+)
+_ROWS = "a row is a dwell: the mean output in one pose, without its samples"
 _REFERENCE = re.compile(r"(?:^|[^a-z])(?:ref\w*|input|drive|base|shaker|exciter|std)(?:[^a-z]|$)", re.IGNORECASE)
 _SLOWEST_HZ = 200.0
 """Least rate of a dynamic recording: slower ones are of a unit at rest or turned by hand."""
@@ -50,6 +56,11 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     seen = recognise(paths, join=join, group=group)
     if seen.is_exchange:
         return Inspection(_of_dwells(paths[0], seen), None, None)
+    if len(paths) == 1 and (meanings := meanings_of_points(seen.content.table)):
+        return Inspection(_of_points(paths[0], seen, meanings), None, None)
+    numbers = seen.content.table.select_dtypes("number").columns
+    if {seen.guessed.columns[str(name)].meaning for name in numbers} == {"outer", "inner"}:
+        return Inspection(_document(seen, [_POSES], "tumbleline plan RECIPE"), None, None)
     dynamic = None
     if seen.output is None and len(paths) == 1:
         dynamic = _dynamic_guess(paths[0], seen.content, seen.guessed, seen.rate_hz)
@@ -71,7 +82,11 @@ def _document(seen: Recognition, open_: list[str], command: str) -> InspectDocum
         "form": seen.source.form,
         "rows": len(content.table),
         "columns": _columns(content, guessed),
-        "remarks": [*content.remarks, *([_NO_REST] if seen.stops is not None and not len(seen.stops.found) else [])],
+        "remarks": [
+            *content.remarks,
+            *([_NO_REST] if seen.stops is not None and not len(seen.stops.found) else []),
+            *([_ROWS] if guessed.dwells and output is not None else []),
+        ],
         "time_unit": guessed.time_unit.meaning,
         "time_reason": guessed.time_unit.reason,
         "output_unit": guessed.output.meaning,
@@ -97,6 +112,22 @@ def _of_dwells(path: Path, seen: Recognition) -> InspectDocument:
     for column in document["columns"]:
         column |= {"resolution": None, "clipped": 0}
     document["remarks"].append(_content_of_dwells(seen.content.table))
+    return document
+
+
+def _of_points(path: Path, seen: Recognition, meanings: Mapping[str, str]) -> InspectDocument:
+    """The document about the points of a transfer function: a row is a frequency, there are neither samples nor dwells."""
+    columns = {str(name): Guess("", "") for name in seen.content.table.columns}
+    columns |= {name: Guess(meaning.replace("_", " "), "its name") for name, meaning in meanings.items()}
+    points = Recognition(seen.paths, seen.content, seen.source, Guesses(columns, Guess("", ""), Guess("", "")))
+    open_: list[str] = []
+    try:
+        transfer_points(seen.content, path.name, PointsLayout())
+    except DataRejected as problem:
+        open_ = [str(problem)]
+    words = ["tumbleline", "import", str(path), "--procedure", "sweep", "--units", serial_of(path)]
+    document = _document(points, open_, shlex.join(words))
+    document["remarks"].append(f"a transfer function: {number_of(len(seen.content.table), 'point')}, a frequency each")
     return document
 
 

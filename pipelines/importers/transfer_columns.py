@@ -85,6 +85,12 @@ def stated_layout(columns: str, units: str, part: Path | None) -> PointsLayout:
     return PointsLayout(*layout, {STATED[key]: float(getattr(sweep, key)) for key in content})
 
 
+def meanings_of_points(table: pd.DataFrame) -> dict[str, str]:
+    """The meaning of each column of a transfer function; empty where names do not show frequency, magnitude and phase."""
+    found = _columns(table, PointsLayout())
+    return {column: meaning for meaning, column in found.items()} if set(NEEDED) <= found.keys() else {}
+
+
 def transfer_points(content: Content, name: str, layout: PointsLayout) -> tuple[Points, str]:
     """The points of a table, and the columns that were recognised by other words than the product's own.
 

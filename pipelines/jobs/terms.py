@@ -10,6 +10,7 @@ from pipelines.jobs.model_files import refuse_unknown_effects
 from pipelines.jobs.recipes import load_limits, lot_of, units_of
 from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import planned_dwells, planned_state
+from pipelines.stages.grade import refuse_limits_without_figures
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.stages.uncertainty.measurands import EFFECTS
@@ -233,6 +234,7 @@ def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list
         lambda: load_limits(recipe, folder),
         # without units in the recipe they are given to the run
         lambda: lot_of(recipe, ()) if recipe.units else None,
+        lambda: refuse_limits_without_figures(load_limits(recipe, folder), with_stability(recipe, station)),
         lambda: refuse_contradictions(recipe, station),
         lambda: refuse_other_outputs(recipe, station),
         lambda: refuse_beyond_station(recipe, station),
@@ -242,6 +244,6 @@ def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list
         try:
             check()
         except TumblelineError as problem:
-            if str(problem) not in messages:  # limits that are missing are missed twice
+            if str(problem) not in messages:  # limits that are missing are missed by each check that reads them
                 messages.append(str(problem))
     return messages

@@ -70,24 +70,30 @@ class GradeEvidence:
 
 
 def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
-    """Refuse limits on figures that the recipe cannot yield, before anything is measured."""
+    """Refuse limits on figures that the recipe cannot yield, all in one message, before anything is measured."""
+    lacking: dict[str, list[str]] = {}
     for name in limits.figures:
-        if name in FIGURES:
-            missing = FIGURES[name].missing(recipe) if recipe.tumbles else "procedure multi_position"
-        elif name in figures_of_recipe(recipe):
-            missing = ""
-        else:
-            owner = next(
-                procedure.name
-                for procedure in PROCEDURES.values()
-                if name in {figure.name for figure in procedure.figures}
-            )
-            missing = f"procedure {owner}"
-        if missing:
-            raise RecipeInvalid(
-                f"limits {limits.name}: {name} needs {missing}, the recipe has none; add it, or drop the limit",
-                key=f"figures.{name}",
-            )
+        if missing := _missing(name, recipe):
+            lacking.setdefault(missing, []).append(name)
+    if lacking:
+        listed = "; ".join(
+            f"{', '.join(names)} {'needs' if len(names) == 1 else 'need'} {missing}"
+            for missing, names in lacking.items()
+        )
+        raise RecipeInvalid(
+            f"limits {limits.name}: {listed}, the recipe has none; add it, or drop the limit",
+            key=f"figures.{next(iter(lacking.values()))[0]}",
+        )
+
+
+def _missing(figure: str, recipe: Recipe) -> str:
+    """What a recipe lacks to yield a figure; empty where it lacks nothing."""
+    if figure in FIGURES:
+        return FIGURES[figure].missing(recipe) if recipe.tumbles else "procedure multi_position"
+    if figure in figures_of_recipe(recipe):
+        return ""
+    owner = next(one.name for one in PROCEDURES.values() if figure in {each.name for each in one.figures})
+    return f"procedure {owner}"
 
 
 def grade(

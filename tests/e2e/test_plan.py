@@ -36,7 +36,9 @@ from pipelines.schedule.timing import minutes
 from schemas.recipe import Recipe
 from schemas.station import load_station
 
-RECIPE = """
+OWN = 'limits = "own.toml"\n'
+LIMITS = 'name = "own"\n[figures]\n{figure} = {{ max = 1000.0, unit = "µg" }}\n'
+RECIPE = f"""{OWN}
 name = "faces"
 device = "adxl355"
 local_gravity_m_s2 = 9.80665
@@ -57,6 +59,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the plan of six faces says of every effect."""
     path = tmp_path_factory.mktemp("seen") / "faces.toml"
     path.write_text(RECIPE, encoding="utf-8")
+    path.with_name("own.toml").write_text(LIMITS.format(figure="residual_rms_ug"), encoding="utf-8")
     return {row["effect"]: row for row in planned(path)["effects"]}
 
 
@@ -64,6 +67,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 def faces(tmp_path: Path) -> Path:
     path = tmp_path / "faces.toml"
     path.write_text(RECIPE, encoding="utf-8")
+    path.with_name("own.toml").write_text(LIMITS.format(figure="residual_rms_ug"), encoding="utf-8")
     return path
 
 
@@ -116,6 +120,7 @@ def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces: Path) -
 def test_the_error_of_a_verification_pose_is_planned_with_its_noise_and_limits_at_risk_are_told(faces: Path) -> None:
     text = f"verification = [[35.0, 55.0]]\n{RECIPE}"
     faces.write_text(text, encoding="utf-8")
+    faces.with_name("own.toml").write_text(LIMITS.format(figure="verification_norm_ug"), encoding="utf-8")
     for density, status, key in ((1500, 0, "at_risk"), (2500, 1, "unreachable")):
         document = document_of("plan", faces, "--noise", f"{density},0", status=status)
         row = next(one for one in document["uncertainty"]["quantities"] if one["quantity"] == "verification_norm")
@@ -147,6 +152,7 @@ REFUSED_BY_RUN = {
     'units = ["A1"]\n[stop]\nvisible = ["thermal_histeresis"]\n': "stop.visible: unknown effect 'thermal_histeresis'",
     "[stop]\nbias_ug = 1.0\n": "[stop] asks for U = 1 µg of bias, the references alone have U = ",
     'limits = "consumr"\n': "no file and no built-in limits are called 'consumr'",
+    'seed = 1\nlimits = "consumer"\n': "verification_norm_ug, verification_ratio, bias_error_ug need verification poses",
     "sensor_axes = 1\n": "sensor_axes: 1 of device ADXL355, its digital output sends 3",
     "static_record_s = 60.0\nstatic_temperature_C = 300.0\n": "key 'static_temperature_C': 300 °C, the chamber",
 }
@@ -154,7 +160,7 @@ REFUSED_BY_RUN = {
 
 @each(REFUSED_BY_RUN)
 def test_what_run_refuses_is_told_by_plan_with_its_exit_status(row: str, faces: Path) -> None:
-    faces.write_text(RECIPE + row, encoding="utf-8")
+    faces.write_text((RECIPE.replace(OWN, "") if "limits" in row else RECIPE) + row, encoding="utf-8")
     status, _, told = given("plan", faces, "--noise", "25,0")
     told = " ".join(told.split())
     assert status == 1
@@ -166,8 +172,17 @@ PLAIN_WORDS = {
     (
         'poses = "six"',
         "poses = [[0, 0], [90]]",
-    ): "key 'poses.1', number 2: found [90]: the two angles [outer, inner] of a pose",
-    ('poses = "six"', "poses = [[0, 0], [4000, 0]]"): "key 'poses.1.0', number 2: found 4000",
+    ): "key 'poses', number 2: found [90]: the two angles [outer, inner] of a pose",
+    ('poses = "six"', "poses = [[0, 0], [4000, 0]]"): "key 'poses', number 2.1: found 4000",
+    ("[25.0]", '[25.0, "warm"]'): "key 'temperatures_C', number 2: found 'warm'",
+    (
+        "[25.0]",
+        '[25.0]\nfaults = [{kind = "a"}, {kinds = "b"}]',
+    ): "unknown key 'faults.kinds', number 2; did you mean kind",
+    (
+        "[25.0]",
+        '[25.0]\nprocedures = [{kind = "tilt"}, {kind = "rotation", rates_deg_s = [1, "fast"]}]',
+    ): "procedures, number 2 (rotation): key 'rates_deg_s', number 2: found 'fast'",
     ("[25.0]", "[]"): "key 'temperatures_C': found []: 1 or more entries are needed",
     ('"faces"', '""'): "key 'name': found '': 1 or more characters are needed",
     ("[25.0]", '[25.0]\nprocedures = ["rotation"]'): 'write [[procedures]], and below it kind = "rotation"',

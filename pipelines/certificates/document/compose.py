@@ -21,7 +21,7 @@ from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.numbers import probability, significant
 from pipelines.certificates.entries import STATIC
 from pipelines.certificates.ledger import stated
-from pipelines.certificates.measured import measured_on, measured_span
+from pipelines.certificates.measured import measured_on, measured_span, same_measurement
 from pipelines.certificates.stated_budget import Row, StatedBudget, edge, stated_budget
 from pipelines.procedures import FIGURES as OF_PROCEDURES
 from pipelines.stages.figures import FIGURES
@@ -129,7 +129,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         limits=str((about.get("limits") or {}).get("name", "")),
         grade_statement=_grade_statement(budget, event.grade),
         adjustment=adjustment(run, calibration, known) if static else NOT_ADJUSTED,
-        amendment=_amendment(calibration, known),
+        amendment=_amendment(run, calibration, known),
         interval=f"As agreed with the customer, the next calibration is due on {calibration.stated_until}."
         if budget.customer_agreed
         else "",
@@ -239,12 +239,12 @@ def _grade_statement(budget: StatedBudget, grade: str) -> str:
     )
 
 
-def _amendment(calibration: Calibration, known: list[Calibration]) -> content.Amendment:
-    """The certificates of the run that a certificate replaces, with the reason, and the certificate that replaces it."""
-    earlier = [old for old in known if old.run == calibration.run and old.event.sequence < calibration.event.sequence]
-    ended = [old.certificate for old in earlier if old.event.sequence in calibration.event.ends]
-    same_kind = [old for old in earlier if calibration.event.ends_others_of(old.event)][-1:]
-    ended = ended or [old.certificate for old in same_kind if old.withdrawn and calibration.event.reason]
-    last = calibration.ended_by
+def _amendment(run: Run, calibration: Calibration, known: list[Calibration]) -> content.Amendment:
+    """What a certificate amends: one of the same measurement that it ended, or that was revoked before; and what ended it."""
+    event, last = calibration.event, calibration.ended_by
+    earlier = [old for old in known if old.event.sequence < event.sequence and same_measurement(run, old.run)]
+    ended = [old.certificate for old in earlier if old.event.sequence in event.ends]
+    same_kind = [old for old in earlier if event.ends_others_of(old.event)][-1:]
+    ended = ended or [old.certificate for old in same_kind if old.withdrawn and event.reason]
     after = last.certificate if last is not None and last.action != "revoke" else ""
-    return content.Amendment(replaces=tuple(ended), reason=calibration.event.reason if ended else "", replaced_by=after)
+    return content.Amendment(replaces=tuple(ended), reason=event.reason if ended else "", replaced_by=after)

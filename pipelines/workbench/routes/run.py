@@ -10,6 +10,7 @@ from starlette.responses import Response
 
 from pipelines.archive import Run
 from pipelines.certificates.ledger import stated
+from pipelines.certificates.measured import measurement_of
 from pipelines.diagnosis.sentences import plain_verdict
 from pipelines.diagnosis.sentences import verdict as sentence
 from pipelines.report.numbers import with_uncertainty
@@ -104,7 +105,7 @@ def _changes(bench: Workbench, this: Run, other: Run) -> dict[tuple[str, str], t
         {(str(row["unit"]), str(row["figure"])): row for row in rows_of(with_standard_error(run.about, table))}
         for run, table in ((run, run_table(bench, run.id, "figures")) for run in (this, other))
     )
-    apart, k = _measurement(this) != _measurement(other), coverage_of(this.about)
+    apart, k = measurement_of(this) != measurement_of(other), coverage_of(this.about)
     found: dict[tuple[str, str], tuple[str, str]] = {}
     for key in figures.keys() & beside.keys():
         change = float(figures[key]["value"]) - float(beside[key]["value"])
@@ -112,13 +113,6 @@ def _changes(bench: Workbench, this: Run, other: Run) -> dict[tuple[str, str], t
         if key[1] in SHOWN and math.isfinite(change):
             found[key] = with_uncertainty(change, k * math.hypot(*standard) if apart else 0.0)
     return found
-
-
-def _measurement(run: Run) -> str:
-    """The identity of the measurement that a run analyses: its capture, else the file that it was imported from, else the run."""
-    about = run.about
-    source = (about.get("source") or {}).get("sha256")
-    return str(about.get("capture") or source or about.get("rerun_of") or run.id)
 
 
 def _judged(bench: Workbench, run: str, tables: Sequence[str]) -> tuple[bool | None, str]:

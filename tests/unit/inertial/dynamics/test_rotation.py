@@ -59,19 +59,42 @@ def rotations(planes: Iterable[str] = PLANES, rates: Sequence[float] = (RATE,)) 
     return Rotations(outer, inner, turned, span, rate, acceleration, time, number.astype(int), uncertain)
 
 
+INSTANTS = (np.arange(200) + 0.5) / 200.0 - 0.5
+"""Of a point, in parts of its span: what is true is averaged over them, not by the nodes of the model."""
+
+
+def angles(points: Rotations, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Outer and inner angle (n,) where the axis that turns has gone on by a step (n,)."""
+    own = points.inner_turns > 0
+    return points.outer + np.where(own, 0.0, step), points.inner + np.where(own, step, 0.0)
+
+
+def gravity(points: Rotations, step: np.ndarray) -> np.ndarray:
+    """Force (n, 3) in the fixture there, written out."""
+    o, i = angles(points, step)
+    return np.stack([np.sin(i) * np.sin(o), np.cos(i) * np.sin(o), np.cos(o)], axis=1)
+
+
+def low_passed(points: Rotations, lag: float) -> np.ndarray:
+    """Means (n, 3) of gravity behind y' = (f - y)/lag, as the integral of its impulse response over the time before."""
+    before, weights = np.polynomial.laguerre.laggauss(20)  # in time constants, weighed with exp(-before)
+    past = [weight * gravity(points, points.span * part - points.rate * lag * time)
+            for part in INSTANTS for time, weight in zip(before, weights, strict=True)]  # fmt: skip
+    return np.sum(past, axis=0) / len(INSTANTS)
+
+
 def true_output(points: Rotations) -> np.ndarray:
-    """Means of the output over each point, by many instants; the force written out, not by the model's nodes."""
+    """Means of the output over each point."""
     total = np.zeros((len(points.time), 3))
-    for part in (np.arange(200) + 0.5) / 200.0 - 0.5:
+    for part in INSTANTS:
         step = points.span * part + points.rate * DELAY
-        own = points.inner_turns > 0
-        o, i = points.outer + np.where(own, 0.0, step), points.inner + np.where(own, step, 0.0)
-        force = np.stack([np.sin(i) * np.sin(o), np.cos(i) * np.sin(o), np.cos(o)], axis=1)
+        (_, i), own = angles(points, step), points.inner_turns > 0
+        force = gravity(points, step)
         about = np.where(own[:, None], [0.0, 0.0, 1.0], np.stack([np.cos(i), -np.sin(i), 0.0 * i], axis=1))
         inward = about * (about @ PLACE)[:, None] - PLACE
         felt = force + points.rate[:, None] ** 2 * inward / 9.80665
         total += BIAS + felt @ MATRIX.T + K2 * felt**2 + K3 * felt**3
-    return total / 200.0
+    return total / len(INSTANTS)
 
 
 def data(points: Rotations, output: np.ndarray, rng: np.random.Generator) -> RotationData:
@@ -106,7 +129,7 @@ def test_both_directions_tell_a_delay_from_an_angle_that_is_off() -> None:
     points, rng = rotations(planes=["xy", "yz"]), np.random.default_rng(4)
     seat = RATE * DELAY
     turned = np.array([[np.cos(seat), np.sin(seat), 0.0], [-np.sin(seat), np.cos(seat), 0.0], [0.0, 0.0, 1.0]])
-    output = BIAS + mean(Nodes.of(points).force) @ turned.T  # no delay, a turned seat
+    output = BIAS + low_passed(points, 0.0) @ turned.T  # no delay, a turned seat
     fit = data(points, output, rng).model.fit(("second_order", "third_order"))
     for name, true in {
         "delay_inner": 0.0,
@@ -119,16 +142,10 @@ def test_both_directions_tell_a_delay_from_an_angle_that_is_off() -> None:
 
 
 def test_a_low_pass_shows_as_gain_over_the_rate_and_as_delay() -> None:
-    """Gravity turns as one phasor: of a time constant τ its gain is 1/√(1 + (ωτ)²), its phase −arctan(ωτ)."""
+    """Gravity turns as one phasor: of a time constant τ its gain is 1/√(1 + (ωτ)²), its phase −arctan(ωτ), about ωτ."""
     lag, rates = 0.05, (0.4 * RATE, RATE)
     points, rng = rotations(planes=["xy", "yz"], rates=rates), np.random.default_rng(41)
-    late = np.arctan(points.rate * lag)
-    own = points.inner_turns > 0
-    moved = replace(
-        points, outer=points.outer - np.where(own, 0.0, late), inner=points.inner - np.where(own, late, 0.0)
-    )
-    gain = 1.0 / np.sqrt(1.0 + (points.rate * lag) ** 2)
-    output = BIAS + (gain[:, None] * mean(Nodes.of(moved).force)) @ MATRIX.T
+    output = BIAS + low_passed(points, lag) @ MATRIX.T
     made = diagnose_rotation(data(points, output, rng))
     assert not made.adequate
     assert "rate_gain" in made.classes[0].effects

@@ -166,7 +166,9 @@ def test_plan_refuses_a_limit_that_cannot_be_reached_and_says_where_nothing_is_s
     assert isinstance(CliRunner().invoke(app, words).exception, RecipeInvalid)
     assert not (tmp_path / "archive" / "captures").exists()
     planned = CliRunner().invoke(app, ["plan", "--station", str(ROOT / "deploy" / "stations" / "simulated-awry.toml")])
-    assert (planned.exit_code, "noise only" in planned.output) == (0, True)
+    assert (planned.exit_code, "noise only" in planned.output) == (1, True)
+    told = "refuses this recipe: limits production: bias_error_period_ug needs [stability] of the device, and [uncertainty]"
+    assert told in " ".join(planned.stderr.split())
 
 
 def test_what_a_certificate_states_is_of_one_unit(run: Run) -> None:

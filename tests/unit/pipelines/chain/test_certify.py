@@ -24,7 +24,7 @@ from pipelines.certificates.refusals import allowed_months
 from pipelines.chain import certifiable
 from pipelines.chain import certify as certifying
 from pipelines.chain.certifiable import refuse_unstated
-from pipelines.chain.certify import certify
+from pipelines.chain.certify import certify, offered
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
@@ -105,9 +105,11 @@ def test_what_was_revoked_is_certified_again_from_the_same_run_only_by_name_and_
     document = json.loads(done.stdout)
     assert (done.exit_code, [one["serial"] for one in document["certified"]]) == (1, ["A1", "A3"])
     assert document["left_out"]["A2"].startswith(
-        "certificate A2/1 of this run was revoked (cracked glass); measure the unit"
+        f"certificate A2/1 of this run was revoked on {day()} (cracked glass); measure the unit"
     )
-    told = r"unit A2 of run .*: certificate A2/1 of this run was revoked \(cracked glass\).*--units A2 --reason TEXT"
+    told = (
+        r"unit A2 of run .*: certificate A2/1 of this run was revoked on .* \(cracked glass\).*--units A2 --reason TEXT"
+    )
     for words in (("--units", "A2"), ("--units", "A2", "--reason", " ")):
         refused = typed("certificate", "issue", run.id, *words).exception
         assert isinstance(refused, WrongUse)
@@ -121,6 +123,54 @@ def test_what_was_revoked_is_certified_again_from_the_same_run_only_by_name_and_
     amendment = compose(run, known[-1], known, NOBODY).amendment
     assert (amendment.replaces, amendment.reason) == (("A2/1",), "another unit was meant")
     assert typed("certificate", "issue", run.id).exit_code == 0  # it holds now like the others
+
+
+def test_a_re_run_of_measurements_whose_certificate_was_revoked_is_certified_only_by_name_and_with_a_reason(
+    run: Run, typed: Typed
+) -> None:
+    model = "bias,scale,misalignment,bias_temperature,scale_temperature,second_order"
+    rerun = run.archive.run(again(run.archive, run.id, change_from_options(model)).new)
+    assert offered(Ledger(run.archive), rerun)
+    typed("certificate", "issue", run.id)
+    assert typed("certificate", "issue", rerun.id, "--units", "A3", "--supersede").exit_code == 0
+    typed("certificate", "revoke", "A1", "--reason", "the seat was loose")
+    typed("certificate", "revoke", "A3", "--reason", "dropped")
+    done = typed("certificate", "issue", rerun.id, "--json")
+    document = json.loads(done.stdout)
+    assert (done.exit_code, [one["serial"] for one in document["certified"]]) == (1, ["A2"])
+    told = f"certificate A1/1 of run {run.id}, which has the same measurements, was revoked on {day()} (the seat was loose)"
+    assert document["left_out"]["A1"].startswith(told)
+    refused = typed("certificate", "issue", rerun.id, "--units", "A1").exception
+    assert isinstance(refused, WrongUse)
+    assert told in str(refused)
+    back = json.loads(typed("certificate", "issue", run.id, "--json").stdout)[
+        "left_out"
+    ]  # nor by the first run once more
+    assert f"certificate A3/2 of run {rerun.id}, which has" in back["A3"]
+    words = ("--units", "A1", "--reason", "the model was wrong, the seat was not", "--json")
+    (named,) = json.loads(typed("certificate", "issue", rerun.id, *words).stdout)["certified"]
+    assert named["certificate"] == "A1/3"
+    known = Ledger(run.archive).calibrations("A1")
+    assert compose(rerun, known[-1], known, NOBODY).amendment.replaces == ("A1/1",)
+
+
+def test_a_certificate_is_offered_where_it_would_be_given(
+    run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ledger = Ledger(run.archive)
+    assert offered(ledger, run)
+    typed("certificate", "issue", run.id)
+    for serial in ("A1", "A2"):
+        typed("certificate", "revoke", serial, "--reason", "dropped")
+    assert offered(ledger, run)  # A3 is left
+    typed("certificate", "revoke", "A3", "--reason", "dropped")
+    assert not offered(ledger, run)
+
+    def refused(_run: Run) -> str:
+        raise WrongUse("its model is not adequate")
+
+    monkeypatch.setattr(certifying, "refuse_inadequate", refused)
+    assert not offered(Ledger(run.archive.root / "other"), run)
 
 
 def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:

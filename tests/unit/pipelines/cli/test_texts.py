@@ -12,9 +12,11 @@ from typer.testing import CliRunner
 
 from inertial.counts import size_text
 from inertial.planning.ranges import UnseenRange
+from pipelines.archive import Archive
 from pipelines.cli import app, flowing
 from pipelines.cli.text.demo_text import print_discovery_demo
 from pipelines.diagnosis.confirmation import fall_of
+from pipelines.jobs.job import Request
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
 from schemas.errors import RecipeInvalid
@@ -38,6 +40,17 @@ def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypat
     assert "'tumbleline run' refuses this recipe" in said
     assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in said
     assert CliRunner().invoke(app, ["plan", hot]).exit_code == 1  # a plan tells what a run refuses
+    blind = recipe_file(
+        tmp_path,
+        ("verification = [[35.0, 15.0], [105.0, -100.0]]", "verification = []"),
+        ("static_record_s = 30.0", "static_record_s = 0.0"),
+        name="blind.toml",
+    )
+    with pytest.raises(
+        RecipeInvalid, match=r"bias_error_ug\S* need verification poses; .* needs? a static record"
+    ) as by_run:
+        Request(blind).job(Archive(tmp_path / "archive"))
+    assert str(by_run.value) in refused(["plan", blind], tmp_path, monkeypatch)  # every limit, in the words of the run
     units = load_recipe(recipe).units
     for bad in ("LN 01", ""):
         serials = recipe_file(tmp_path, (f'"{units[0]}"', f'"{bad}"'), name="serials.toml")
