@@ -125,7 +125,7 @@ def offered(ledger: Ledger, run: Run) -> bool:
     first = today()
     try:
         refuse_period(run, first, last := months_after(first, allowed_months(run)))
-        return any(not withdrawn(ledger, run, one) for one in _proposals(run, (), first, last, "")[0])
+        return any(not withdrawn(ledger, run, proposal) for proposal in _proposals(run, (), first, last, "")[0])
     except WrongUse:
         return False
 

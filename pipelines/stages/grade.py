@@ -92,7 +92,7 @@ def _missing(figure: str, recipe: Recipe) -> str:
         return FIGURES[figure].missing(recipe) if recipe.tumbles else "procedure multi_position"
     if figure in figures_of_recipe(recipe):
         return ""
-    owner = next(one.name for one in PROCEDURES.values() if figure in {each.name for each in one.figures})
+    owner = next(p.name for p in PROCEDURES.values() if figure in {spec.name for spec in p.figures})
     return f"procedure {owner}"
 
 
