@@ -17,9 +17,7 @@ from typer.testing import CliRunner
 from inertial.uncertainty.rounding import chance
 from pipelines.archive import Archive, Run
 from pipelines.cli import app
-from pipelines.cli.run import _next
-from pipelines.cli.summary import summary
-from pipelines.cli.text.verdict_text import judged, print_adequacy
+from pipelines.cli.text.verdict_text import print_adequacy
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.sentences import verdict
 from pipelines.jobs.adequacy import adequacy_of
@@ -168,20 +166,3 @@ def test_a_run_that_cannot_be_judged_says_why_and_one_without_model_or_poses_say
     assert verdict_of(judge(_plain(), None, ())["verdict"]) is None
     assert adequacy_of(WithoutTumbling()) is None  # pyright: ignore[reportArgumentType]
     assert _panel(WithoutTumbling()) is None
-
-
-def test_a_certificate_is_offered_for_units_that_pass_by_a_budget_under_an_adequate_model(run: Run) -> None:
-    document = judged(summary(run), run)
-    unit = document["units"][0] | {"outcome": "pass", "basis": "budget"}
-    verdict = document["adequacy"]
-    for change, adequate, offered in (
-        ({}, True, True),
-        ({"grade": "none"}, True, True),
-        ({"outcome": "fail"}, True, False),
-        ({"basis": "noise only"}, True, False),
-        ({}, False, False),
-    ):
-        seen = document | {"units": [unit | change], "adequacy": verdict | {"adequate": adequate}}
-        lines = _next(run, seen, None)
-        assert any(line.startswith("tumbleline certificate issue") for line in lines) is offered
-        assert lines[0] == f"tumbleline diagnose {run.id}"

@@ -78,8 +78,8 @@ why = "residuals follow the force"
 @each([
     (COMMENTED, '"humidity_pct"', '"sqr(humidity_pct)"', "formula wet: unknown function 'sqr'; did you mean sqrt"),
     (COMMENTED, 'id = "wet"', 'id = "third_order"', "the catalogue has an effect with this id"),
-    (COMMENTED, 'id = "wet"', 'id = "Wet one"', "formula.0.id"),
-    (COMMENTED, 'columns = ["humidity_pct"]', "columns = []", "formula.0.columns"),
+    (COMMENTED, 'id = "wet"', 'id = "Wet one"', "formula.id', number 1"),
+    (COMMENTED, 'columns = ["humidity_pct"]', "columns = []", "formula.columns', number 1"),
     (VERSIONS, "version = 2\neffects", "version = 3\neffects", "every version needs its"),
     (VERSIONS, '["bias", "scale"]', '["bias", "bias"]', "bias is there twice"),
     (VERSIONS, 'why = "start"', 'wy = "start"', "did you mean why"),
@@ -124,7 +124,7 @@ def judged(confirmed, part, error, fall, density=None):
     by = "fresh run" if part is not None else "dwells left out"
     return {
         "judged_by": by, "confirmed": confirmed, "part": part, "part_u": error, "fall_ug": fall, "fall_u_ug": 0.4,
-        "log_density": density, "estimated_again": None,
+        "log_density": density, "estimated_again": None, "reason": None, "rises": None,
     }  # fmt: skip
 
 
