@@ -1,6 +1,6 @@
 """The measured dwells of a lot, the input of the search for data faults."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,9 @@ from inertial.state import ALL_AXES
 
 STANDARD_GRAVITY = 9.80665  # m/s² in one g
 _TURNED = 0.05  # singular value, per root of a dwell, below which poses do not separate response and bias
+_WARM = 2.5
+"""Departure of the temperature from its mean, K, from which on its linear terms are taken out of the output."""
+
 _ROUNDS = 12  # of reweighting
 _TUKEY = 4.685
 """Widths of the biweight: 95 % efficiency under normal noise (Holland & Welsch, Commun. Stat. A6 (1977) 813)."""
@@ -94,6 +97,24 @@ class Readings:
     def scale(self) -> Array:
         """Typical output per g of every unit, (units,): the root of the mean squared response."""
         return np.sqrt(np.sum(self.fits[:, :, 1:] ** 2, axis=(1, 2)) / len(self.axes))
+
+    @cached_property
+    def without_bias_slope(self) -> "Readings":
+        """The same readings less what a straight line of the bias over the temperature adds, with :attr:`fits` that follow.
+
+        The line is fitted together with a steady response, robustly: of a sensor of 1 mg/K the dwells of a cold soak would else
+        count as other poses, while slopes of the response, too, could take up a wrong pose of a short plan.
+        """
+        warm = self.warm
+        if warm is None or not self.turned or not np.isfinite(warm[self.there]).all():
+            return self
+        theta = warm - np.nanmean(warm, axis=1, keepdims=True)
+        if np.nanmax(np.abs(theta)) < _WARM:
+            return self
+        # the temperature beside the three forces: one more column of the design
+        driven = np.concatenate([shown_force(self.force, self.axes), theta[..., None]], axis=-1)
+        slope = np.stack([robust_fit(x, y)[:, 4] for x, y in zip(driven, self.output, strict=True)])
+        return replace(self, output=self.output - theta[..., None] * slope[:, None, :])
 
     @cached_property
     def misfit_when_warm(self) -> Array:

@@ -15,7 +15,8 @@ _COMMON = 5.0
 
 def wrong_poses(readings: Readings) -> Iterator[Fault]:
     """Dwells whose output belongs to another direction of gravity than the one commanded."""
-    size = np.linalg.norm(readings.misfit, axis=-1)
+    steady = readings.without_bias_slope
+    size = np.linalg.norm(steady.misfit, axis=-1)
     typical = np.nanmedian(size, axis=1, keepdims=True)
     out = size > np.maximum(0.02, 15.0 * typical)
     if len(out) > 2:
@@ -28,7 +29,7 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         places = np.flatnonzero(row)
         if not places.size or places.size > 0.4 * row.size or unit in swapped:
             continue
-        felt = _felt(readings, unit, places)
+        felt = _felt(steady, unit, places)
         turned = np.abs(np.linalg.norm(felt, axis=-1) - 1.0) < 0.02
         if not turned.any():
             continue
@@ -50,7 +51,7 @@ def _exchanged(readings: Readings) -> Iterator[int]:
 def _felt(readings: Readings, unit: int, places: Places) -> Array:
     """Specific force that the outputs at some dwells stand for, (k, 3), g."""
     fit = readings.fits[unit]
-    return np.linalg.solve(fit[:, 1:], (readings.output[unit, places] - fit[:, 0]).T).T
+    return (np.linalg.pinv(fit[:, 1:]) @ (readings.output[unit, places] - fit[:, 0]).T).T
 
 
 def _which_pose(force: Array, places: Places, felt: Array) -> tuple[str, str]:
