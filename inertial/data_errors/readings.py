@@ -86,11 +86,15 @@ class Readings:
         )
 
     def _nominal(self, force: Array, output: Array) -> Array:
-        """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the norm of the mean output."""
+        """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the usual norm of the outputs over that of the force.
+
+        Of each dwell by itself: the mean output of a tumble about one axis is its bias, and no response.
+        """
         known = {"g": 1.0, "m/s^2": STANDARD_GRAVITY}
-        typical = float(np.linalg.norm(np.nanmedian(output, axis=0)))
-        scale = known.get(self.unit_name or "", typical if typical > 0.0 else 1.0)
-        bias = np.nanmedian(output - scale * force[:, self.axes], axis=0)
+        felt = force[:, self.axes]
+        typical, turned = (float(np.nanmedian(np.linalg.norm(values, axis=-1))) for values in (output, felt))
+        scale = known.get(self.unit_name or "", typical / turned if min(typical, turned) > 0.0 else 1.0)
+        bias = np.nanmedian(output - scale * felt, axis=0)
         return np.concatenate([bias[:, None], scale * np.eye(3)[list(self.axes)]], axis=1)
 
     @cached_property

@@ -70,3 +70,12 @@ def test_a_dwell_whose_samples_are_one_code_is_stuck_only_where_the_code_is_not_
     output[0, 40, 1], spread[0, 40, 1] = output[0, 39, 1], 0.0
     (fault,) = find_faults(replace(coarse, output=output, spread=spread))
     assert (fault.name, fault.dwells) == ("stuck_output", (40,))
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (1,), (2,)])
+def test_a_tumble_about_one_axis_tells_the_scale(axes: tuple[int, ...]) -> None:
+    angle = np.radians(np.arange(-180.0, 180.0, 15.0))
+    force = np.stack([np.zeros_like(angle), np.sin(angle), np.cos(angle)], axis=-1)[None]
+    output = 0.3 * (force + (0.02, -0.03, 0.04))[..., axes]
+    tumble = Readings(force=force, output=output, time=np.arange(24.0)[None], unit_name="V", axes=axes)
+    assert tumble.scale == pytest.approx(0.3, rel=0.05)
