@@ -86,7 +86,7 @@ class Readings:
         )
 
     def _nominal(self, force: Array, output: Array) -> Array:
-        """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the usual norm of the outputs over that of the force.
+        """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the norm of an output over that of its force.
 
         Of each dwell by itself: the mean output of a tumble about one axis is its bias, and no response.
         """

@@ -76,6 +76,6 @@ def test_a_dwell_whose_samples_are_one_code_is_stuck_only_where_the_code_is_not_
 def test_a_tumble_about_one_axis_tells_the_scale(axes: tuple[int, ...]) -> None:
     angle = np.radians(np.arange(-180.0, 180.0, 15.0))
     force = np.stack([np.zeros_like(angle), np.sin(angle), np.cos(angle)], axis=-1)[None]
-    output = 0.3 * (force + (0.02, -0.03, 0.04))[..., axes]
+    output = 0.3 * (force + np.array([0.02, -0.03, 0.04]))[..., axes]
     tumble = Readings(force=force, output=output, time=np.arange(24.0)[None], unit_name="V", axes=axes)
     assert tumble.scale == pytest.approx(0.3, rel=0.05)
