@@ -14,6 +14,9 @@ _TURNED = 0.05  # singular value, per root of a dwell, below which poses do not 
 _WARM = 2.5
 """Departure of the temperature from its mean, K, from which on its linear terms are taken out of the output."""
 
+FAR_G = 0.02
+"""Misfit, g, from which on a dwell may be in another pose: more than the gain of a device changes between two soaks."""
+
 _ROUNDS = 12  # of reweighting
 _TUKEY = 4.685
 """Widths of the biweight: 95 % efficiency under normal noise (Holland & Welsch, Commun. Stat. A6 (1977) 813)."""
@@ -117,7 +120,8 @@ class Readings:
             return self
         # the temperature beside the three forces: one more column of the design
         driven = np.concatenate([shown_force(self.force, self.axes), theta[..., None]], axis=-1)
-        slope = np.stack([robust_fit(x, y)[:, 4] for x, y in zip(driven, self.output, strict=True)])
+        each = zip(driven, self.output, (FAR_G * self.scale).tolist(), strict=True)
+        slope = np.stack([robust_fit(x, y, least=least)[:, 4] for x, y, least in each])
         return replace(self, output=self.output - theta[..., None] * slope[:, None, :])
 
     @cached_property
@@ -149,7 +153,7 @@ def design(force: Array, theta: Array | None = None) -> Array:
     return x if theta is None else np.concatenate([x, theta[:, None] * x], axis=-1)
 
 
-def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array:
+def robust_fit(force: Array, output: Array, theta: Array | None = None, *, least: float = 0.0) -> Array:
     """Bias and response (3, 4) that the majority of dwells agrees on: least squares reweighted by Tukey's biweight.
 
     Dwells are weighed by the norm of their residual over the three axes, so that a wrong pose loses all three together.
@@ -157,6 +161,8 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
     Parameters
     ----------
     theta : (n,), temperature above the reference, K: the slopes of all four over it are fitted too, and follow them, (3, 8)
+    least : residual, output unit, up to which a dwell counts in full: where many dwells agree closely, those of another
+        temperature would else have no weight
     """
     there = np.isfinite(output).all(axis=-1)
     x, y = design(force, theta)[there], output[there]
@@ -169,8 +175,12 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
         if middle <= 0.0:
             break
         # absolute values first: they reject outliers between which the biweight could remain
-        u = size / (_TUKEY * 1.5 * middle)
-        weight = np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else np.where(u < 1.0, 1.0 - u**2, 0.0)
+        u = size / (_TUKEY * max(1.5 * middle, least))
+        weight = (
+            np.sqrt(1.0 / np.maximum(size, max(0.1 * middle, least)))
+            if turn < 5
+            else np.where(u < 1.0, 1.0 - u**2, 0.0)
+        )
         if np.count_nonzero(weight) <= x.shape[1]:
             break
     return coefficients.T

@@ -7,7 +7,7 @@ import numpy as np
 from inertial.arrays import Places
 from inertial.data_errors.exchanged import PlainFit
 from inertial.data_errors.faults.fault import Fault, Look
-from inertial.data_errors.readings import Array, Readings
+from inertial.data_errors.readings import FAR_G, Array, Readings
 
 _COMMON = 5.0
 """Multiple of the usual misfit that half of the units exceed in a dwell whose pose is wrong for all."""
@@ -18,7 +18,7 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
     steady = readings.without_bias_slope
     size = np.linalg.norm(steady.misfit, axis=-1)
     typical = np.nanmedian(size, axis=1, keepdims=True)
-    out = size > np.maximum(0.02, 15.0 * typical)
+    out = size > np.maximum(FAR_G, 15.0 * typical)
     if len(out) > 2:
         # an error of most units belongs to the plan or the table: the search for effects reports it
         ratio = np.nanmedian(size / np.where(typical > 0.0, typical, np.inf), axis=0, keepdims=True)

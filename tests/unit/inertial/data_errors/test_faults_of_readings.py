@@ -10,6 +10,7 @@ from inertial.data_errors.readings import Readings
 
 SOAKS = (25.0, 0.0, -20.0, 25.0, 60.0, 25.0)
 PER_KELVIN = 1e-3  # g/K, of a usual MEMS device
+GAIN_PER_KELVIN = 2.5e-4
 
 
 def readings(
@@ -25,8 +26,10 @@ def readings(
     if exchanged:
         felt[0, [20, 27]] = felt[0, [27, 20]]
     response = np.eye(3) + rng.normal(0.0, 0.004, (units, 3, 3))
-    run = PER_KELVIN * rng.choice([-1.0, 1.0], (units, 1, 3)) * (warm - 25.0)[..., None]
-    output = felt @ np.swapaxes(response, 1, 2) + rng.normal(0.0, 0.03, (units, 1, 3)) + run
+    theta = (warm - 25.0)[..., None]
+    run = PER_KELVIN * rng.choice([-1.0, 1.0], (units, 1, 3)) * theta
+    gain = 1.0 + GAIN_PER_KELVIN * rng.choice([-1.0, 1.0], (units, 1, 3)) * theta
+    output = gain * (felt @ np.swapaxes(response, 1, 2)) + rng.normal(0.0, 0.03, (units, 1, 3)) + run
     size = np.resize(sensitivity, units)[:, None, None]
     output = size * (output + rng.normal(0.0, 30e-6, output.shape))
     count = np.full(warm.shape, 50.0)
