@@ -1,6 +1,6 @@
 """The measured dwells of a lot, the input of the search for data faults."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,12 @@ from inertial.state import ALL_AXES
 
 STANDARD_GRAVITY = 9.80665  # m/s² in one g
 _TURNED = 0.05  # singular value, per root of a dwell, below which poses do not separate response and bias
+_WARM = 2.5
+"""Departure of the temperature from its mean, K, from which on its linear terms are taken out of the output."""
+
+FAR_G = 0.02
+"""Misfit, g, from which on a dwell may be in another pose: more than the gain of a device changes between two soaks."""
+
 _ROUNDS = 12  # of reweighting
 _TUKEY = 4.685
 """Widths of the biweight: 95 % efficiency under normal noise (Holland & Welsch, Commun. Stat. A6 (1977) 813)."""
@@ -83,17 +89,40 @@ class Readings:
         )
 
     def _nominal(self, force: Array, output: Array) -> Array:
-        """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the norm of the mean output."""
+        """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the norm of an output over that of its force.
+
+        Of each dwell by itself: the mean output of a tumble about one axis is its bias, and no response.
+        """
         known = {"g": 1.0, "m/s^2": STANDARD_GRAVITY}
-        typical = float(np.linalg.norm(np.nanmedian(output, axis=0)))
-        scale = known.get(self.unit_name or "", typical if typical > 0.0 else 1.0)
-        bias = np.nanmedian(output - scale * force[:, self.axes], axis=0)
+        felt = force[:, self.axes]
+        typical, turned = (float(np.nanmedian(np.linalg.norm(values, axis=-1))) for values in (output, felt))
+        scale = known.get(self.unit_name or "", typical / turned if min(typical, turned) > 0.0 else 1.0)
+        bias = np.nanmedian(output - scale * felt, axis=0)
         return np.concatenate([bias[:, None], scale * np.eye(3)[list(self.axes)]], axis=1)
 
     @cached_property
     def scale(self) -> Array:
         """Typical output per g of every unit, (units,): the root of the mean squared response."""
         return np.sqrt(np.sum(self.fits[:, :, 1:] ** 2, axis=(1, 2)) / len(self.axes))
+
+    @cached_property
+    def without_bias_slope(self) -> "Readings":
+        """The same readings less what a straight line of the bias over the temperature adds, with :attr:`fits` that follow.
+
+        The line is fitted together with a steady response, robustly: of a sensor of 1 mg/K the dwells of a cold soak would else
+        count as other poses, while slopes of the response, too, could take up a wrong pose of a short plan.
+        """
+        warm = self.warm
+        if warm is None or not self.turned or not np.isfinite(warm[self.there]).all():
+            return self
+        theta = warm - np.nanmean(warm, axis=1, keepdims=True)
+        if np.nanmax(np.abs(theta)) < _WARM:
+            return self
+        # the temperature beside the three forces: one more column of the design
+        driven = np.concatenate([shown_force(self.force, self.axes), theta[..., None]], axis=-1)
+        each = zip(driven, self.output, (FAR_G * self.scale).tolist(), strict=True)
+        slope = np.stack([robust_fit(x, y, least=least)[:, 4] for x, y, least in each])
+        return replace(self, output=self.output - theta[..., None] * slope[:, None, :])
 
     @cached_property
     def misfit_when_warm(self) -> Array:
@@ -124,7 +153,7 @@ def design(force: Array, theta: Array | None = None) -> Array:
     return x if theta is None else np.concatenate([x, theta[:, None] * x], axis=-1)
 
 
-def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array:
+def robust_fit(force: Array, output: Array, theta: Array | None = None, *, least: float = 0.0) -> Array:
     """Bias and response (3, 4) that the majority of dwells agrees on: least squares reweighted by Tukey's biweight.
 
     Dwells are weighed by the norm of their residual over the three axes, so that a wrong pose loses all three together.
@@ -132,6 +161,8 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
     Parameters
     ----------
     theta : (n,), temperature above the reference, K: the slopes of all four over it are fitted too, and follow them, (3, 8)
+    least : residual, output unit, up to which a dwell counts in full: where many dwells agree closely, those of another
+        temperature would else have no weight
     """
     there = np.isfinite(output).all(axis=-1)
     x, y = design(force, theta)[there], output[there]
@@ -144,8 +175,12 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
         if middle <= 0.0:
             break
         # absolute values first: they reject outliers between which the biweight could remain
-        u = size / (_TUKEY * 1.5 * middle)
-        weight = np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else np.where(u < 1.0, 1.0 - u**2, 0.0)
+        u = size / (_TUKEY * max(1.5 * middle, least))
+        weight = (
+            np.sqrt(1.0 / np.maximum(size, max(0.1 * middle, least)))
+            if turn < 5
+            else np.where(u < 1.0, 1.0 - u**2, 0.0)
+        )
         if np.count_nonzero(weight) <= x.shape[1]:
             break
     return coefficients.T

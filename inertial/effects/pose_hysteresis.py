@@ -39,7 +39,8 @@ class PoseHysteresis(SensorEffect):
         if kept == UNTIL_MOVE:
             return stack(state, [np.tanh(state.force_step[..., axis] / half_width)])
         inside = state.remember(
-            (self.id, axis, half_width, kept), lambda: _at_dwells(operators.play, state, axis, half_width, kept)
+            (self.id, axis, half_width, kept),
+            lambda: _at_dwells(lambda signal: _from_zero(signal, half_width), state, axis, kept),
         )
         return stack(state, [inside])
 
@@ -48,16 +49,19 @@ class PoseHysteresis(SensorEffect):
             first = np.zeros(state.time.shape)
             first[..., 0] = 1.0
             return stack(state, [first])
-        return stack(state, [_at_dwells(operators.play_memory, state, axis, half_width, kept)])
+        # the side from which the first pose was reached is not recorded: the table came from anywhere
+        memory = _at_dwells(lambda signal: operators.play_memory(signal, half_width), state, axis, kept)
+        return stack(state, [memory])
 
 
-def _at_dwells(operator: Callable[[Array, float], Array], state: State, axis: int, width: float, kept: float) -> Array:
-    """An operator with memory over the force along an axis, from pose to pose or over the way between, at the dwells, (..., n).
-
-    Without a force before the first pose: what is dragged is at zero, as far as the width lets it (Visintin's initial state).
-    """
+def _at_dwells(operator: Callable[[Array], Array], state: State, axis: int, kept: float) -> Array:
+    """An operator with memory over the force along an axis, from pose to pose or over the way, at the dwells, (..., n)."""
     way = state.way if kept == ON_THE_WAY else None
     course = state.force[..., None, axis] if way is None else way[..., axis]
-    signal = course.reshape(*course.shape[:-2], -1)
-    values = operator(np.concatenate([np.zeros_like(signal[..., :1]), signal], axis=-1), width)[..., 1:]
+    values = operator(course.reshape(*course.shape[:-2], -1))
     return values.reshape(course.shape)[..., -1]
+
+
+def _from_zero(signal: Array, width: float) -> Array:
+    """The play of a signal before which what is dragged is at zero, as far as the width lets it (Visintin's initial state)."""
+    return operators.play(np.concatenate([np.zeros_like(signal[..., :1]), signal], axis=-1), width)[..., 1:]

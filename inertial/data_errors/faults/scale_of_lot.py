@@ -9,21 +9,22 @@ from inertial.data_errors.readings import Readings
 
 
 def scale_units(readings: Readings) -> Iterator[Fault]:
-    """A unit whose scale is far from its lot's."""
+    """A unit whose scale is far from that on which more than half of the units agree.
+
+    Where no such half is, the lot is of several ranges or sensitivities, and no unit of it is the odd one.
+    """
     scale = readings.scale
-    for unit in range(scale.size):
-        alone = 1.0 if readings.unit_name == "g" else float(scale[unit])
-        others = float(np.median(np.delete(scale, unit))) if scale.size > 2 else alone
-        ratio = float(scale[unit]) / others
-        if not 0.75 < ratio < 1.33:
-            octaves = np.log2(ratio)
-            power_of_two = abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4
-            yield Fault(
-                "wrong_range" if power_of_two else "wrong_units",
-                unit,
-                (),
-                f"scale is {ratio:.4g} times that of the lot",
-            )
+    alone = np.ones(scale.size) if readings.unit_name == "g" else scale
+    usual = np.full(scale.size, np.median(scale)) if scale.size > 2 else alone
+    ratios = scale / usual
+    near = (ratios > 0.75) & (ratios < 1.33)
+    if scale.size > 2 and 2 * np.count_nonzero(near) <= scale.size:
+        return
+    for unit in np.flatnonzero(~near).tolist():
+        octaves = np.log2(ratios[unit])
+        power_of_two = abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4
+        evidence = f"scale is {ratios[unit]:.4g} times that of the lot"
+        yield Fault("wrong_range" if power_of_two else "wrong_units", unit, (), evidence)
 
 
 LOOK = Look(scale_units, ("wrong_range", "wrong_units"), order=70)

@@ -9,6 +9,15 @@ from inertial.counts import number_of
 from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
+_COARSE = 2.0
+"""Multiple of a large scatter within which the code without scatter is the one that belongs to the pose.
+
+The samples of a dwell that lies midway between two codes, a step q apart, scatter by q/2; a dwell of one code is at most q/2 off.
+"""
+
+_LARGE = 0.9
+"""Quantile of the scatters of an axis that counts as a large one: at steps of eight times the noise, a fifth are of two codes."""
+
 
 def stuck(readings: Readings) -> Iterator[Fault]:
     """Outputs equal to the last digit in dwells of different poses; or samples of a dwell that are all equal."""
@@ -37,12 +46,14 @@ def _still(readings: Readings, unit: int) -> Places:
     if readings.spread is None or readings.count is None:
         return np.zeros(0, dtype=np.intp)
     spread = np.where((readings.count[unit] > 2.0)[:, None], readings.spread[unit], np.nan)
-    usual = (
-        np.nan_to_num(np.nanmedian(spread, axis=0))
-        if np.isfinite(spread).any(axis=0).all()
-        else np.zeros(spread.shape[-1])
-    )
-    return np.flatnonzero(np.any((spread < 1e-6 * usual) & (usual > 0.0), axis=-1))
+    if not np.isfinite(spread).any(axis=0).all():
+        return np.zeros(0, dtype=np.intp)
+    usual, large = np.nanquantile(spread, (0.5, _LARGE), axis=0)
+    still = (spread < 1e-6 * usual) & (usual > 0.0)
+    if readings.turned:
+        # samples between two steps of a coarse converter are all one code, which follows the pose: that axis is not stuck
+        still &= ~(np.abs(readings.misfit_when_warm[unit]) * readings.scale[unit] < _COARSE * large)
+    return np.flatnonzero(np.any(still, axis=-1))
 
 
 LOOK = Look(stuck, ("stuck_output",), order=40)

@@ -7,7 +7,7 @@ import numpy as np
 from inertial.arrays import Places
 from inertial.data_errors.exchanged import PlainFit
 from inertial.data_errors.faults.fault import Fault, Look
-from inertial.data_errors.readings import Array, Readings
+from inertial.data_errors.readings import FAR_G, Array, Readings
 
 _COMMON = 5.0
 """Multiple of the usual misfit that half of the units exceed in a dwell whose pose is wrong for all."""
@@ -15,9 +15,10 @@ _COMMON = 5.0
 
 def wrong_poses(readings: Readings) -> Iterator[Fault]:
     """Dwells whose output belongs to another direction of gravity than the one commanded."""
-    size = np.linalg.norm(readings.misfit, axis=-1)
+    steady = readings.without_bias_slope
+    size = np.linalg.norm(steady.misfit, axis=-1)
     typical = np.nanmedian(size, axis=1, keepdims=True)
-    out = size > np.maximum(0.02, 15.0 * typical)
+    out = size > np.maximum(FAR_G, 15.0 * typical)
     if len(out) > 2:
         # an error of most units belongs to the plan or the table: the search for effects reports it
         ratio = np.nanmedian(size / np.where(typical > 0.0, typical, np.inf), axis=0, keepdims=True)
@@ -28,7 +29,7 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         dwells = np.flatnonzero(row)
         if not dwells.size or dwells.size > 0.4 * row.size or unit in swapped:
             continue
-        felt = _felt(readings, unit, dwells)
+        felt = _felt(steady, unit, dwells)
         turned = np.abs(np.linalg.norm(felt, axis=-1) - 1.0) < 0.02
         if not turned.any():
             continue
@@ -50,7 +51,7 @@ def _exchanged(readings: Readings) -> Iterator[int]:
 def _felt(readings: Readings, unit: int, dwells: Places) -> Array:
     """Specific force that the outputs at some dwells stand for, (k, 3), g."""
     fit = readings.fits[unit]
-    return np.linalg.solve(fit[:, 1:], (readings.output[unit, dwells] - fit[:, 0]).T).T
+    return (np.linalg.pinv(fit[:, 1:]) @ (readings.output[unit, dwells] - fit[:, 0]).T).T
 
 
 def _which_pose(force: Array, dwells: Places, felt: Array) -> tuple[str, str]:

@@ -29,6 +29,22 @@ def dragged(turns: np.ndarray, axis: int) -> np.ndarray:
     return np.array(out)
 
 
+@pytest.mark.parametrize("kept", [FROM_POSE, ON_THE_WAY])
+def test_the_side_from_which_the_first_pose_was_reached_is_open(kept: float) -> None:
+    turns = angles(25)
+    poses = frames.force_from_angles(*turns)
+    state = State(force=poses, time=np.arange(25.0), outer=turns[0], inner=turns[1])
+    home = np.concatenate([np.zeros((2, 1)), turns], axis=1)
+    whole = State(force=frames.force_from_angles(*home), time=np.arange(26.0), outer=home[0], inner=home[1])
+    effect = PoseHysteresis()
+    for axis in range(3):
+        known = effect.columns(whole, axis, half_width=WIDTH, kept=kept)[1:, 0]
+        assumed = effect.columns(state, axis, half_width=WIDTH, kept=kept)[:, 0]
+        start = effect.start_columns(state, axis, half_width=WIDTH, kept=kept)[:, 0]
+        assert start[0] == 1.0
+        np.testing.assert_allclose(known, assumed + (known - assumed)[0] * start, atol=0.02)
+
+
 @pytest.mark.parametrize("turned", [np.eye(3), np.roll(np.eye(3), 1, axis=0)])
 def test_the_side_follows_the_force_over_the_way(turned: np.ndarray) -> None:
     turns = angles(25)

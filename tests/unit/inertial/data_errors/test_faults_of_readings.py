@@ -1,0 +1,84 @@
+"""Faults of data are told from what a sound lot has: a bias that follows the temperature, several ranges, a coarse converter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from inertial.data_errors.faults import find_faults
+from inertial.data_errors.readings import Readings
+
+SOAKS = (25.0, 0.0, -20.0, 25.0, 60.0, 25.0)
+PER_KELVIN = 1e-3  # g/K, of a usual MEMS device
+GAIN_PER_KELVIN = 2.5e-4
+
+
+def readings(
+    rng: np.random.Generator, *, units: int = 1, exchanged: bool = False, sensitivity: tuple[float, ...] = (1.0,)
+) -> Readings:
+    """Sound units in 16 directions at each of six soaks, 30 µg of noise; two poses of the first unit may be exchanged."""
+    z = np.linspace(-0.95, 0.95, 16)
+    around = np.arange(16) * 2.4
+    poses = np.stack([np.sqrt(1 - z**2) * np.cos(around), np.sqrt(1 - z**2) * np.sin(around), z], axis=-1)
+    force = np.tile(poses, (len(SOAKS), 1))
+    warm = np.repeat(SOAKS, 16) + rng.normal(0.0, 0.01, (units, len(force)))
+    felt = np.repeat(force[None], units, axis=0)
+    if exchanged:
+        felt[0, [20, 27]] = felt[0, [27, 20]]
+    response = np.eye(3) + rng.normal(0.0, 0.004, (units, 3, 3))
+    theta = (warm - 25.0)[..., None]
+    run = PER_KELVIN * rng.choice([-1.0, 1.0], (units, 1, 3)) * theta
+    gain = 1.0 + GAIN_PER_KELVIN * rng.choice([-1.0, 1.0], (units, 1, 3)) * theta
+    output = gain * (felt @ np.swapaxes(response, 1, 2)) + rng.normal(0.0, 0.03, (units, 1, 3)) + run
+    size = np.resize(sensitivity, units)[:, None, None]
+    output = size * (output + rng.normal(0.0, 30e-6, output.shape))
+    count = np.full(warm.shape, 50.0)
+    return Readings(
+        force=np.repeat(force[None], units, axis=0),
+        output=output,
+        time=np.tile(60.0 * np.arange(len(force)), (units, 1)),
+        spread=np.full(output.shape, 2e-4) * size * rng.uniform(0.9, 1.1, output.shape),
+        count=count,
+        temperature=warm,
+    )
+
+
+@pytest.mark.parametrize("units", [1, 3])
+def test_a_bias_that_runs_with_the_temperature_is_no_wrong_pose_and_hides_none(units: int) -> None:
+    for seed in range(6):
+        assert not find_faults(readings(np.random.default_rng(seed), units=units))
+        (fault,) = find_faults(readings(np.random.default_rng(seed), units=units, exchanged=True))
+        assert (fault.name, fault.unit, fault.dwells) == ("swapped_dwells", 0, (20, 27))
+
+
+def test_one_unit_of_another_range_is_told_and_a_lot_of_several_ranges_has_no_odd_one() -> None:
+    rng = np.random.default_rng(3)
+    odd = find_faults(readings(rng, units=5, sensitivity=(1.0, 1.0, 1.0, 2.0, 1.0)))
+    assert [(fault.name, fault.unit) for fault in odd] == [("wrong_range", 3)]
+    assert not find_faults(readings(rng, units=6, sensitivity=(1.0, 0.5, 16.0)))
+    assert not find_faults(readings(rng, units=4, sensitivity=(1.0, 0.0625)))
+
+
+def test_a_dwell_whose_samples_are_one_code_is_stuck_only_where_the_code_is_not_that_of_its_pose() -> None:
+    rng = np.random.default_rng(5)
+    sound = readings(rng)
+    step = 8e-4
+    sample = sound.output[:, :, None] + rng.normal(0.0, 0.2 * step, (1, 96, 50, 3))
+    codes = step * np.round(sample / step)
+    coarse = replace(sound, output=codes.mean(axis=2), spread=codes.std(axis=2))
+    assert coarse.spread is not None
+    assert np.count_nonzero(coarse.spread < 1e-9) > 20
+    assert [fault.name for fault in find_faults(coarse)] == ["quantised"]
+    output, spread = coarse.output.copy(), coarse.spread.copy()
+    output[0, 40, 1], spread[0, 40, 1] = output[0, 39, 1], 0.0
+    (fault,) = find_faults(replace(coarse, output=output, spread=spread))
+    assert (fault.name, fault.dwells) == ("stuck_output", (40,))
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (1,), (2,)])
+def test_a_tumble_about_one_axis_tells_the_scale(axes: tuple[int, ...]) -> None:
+    angle = np.radians(np.arange(-180.0, 180.0, 15.0))
+    force = np.stack([np.zeros_like(angle), np.sin(angle), np.cos(angle)], axis=-1)[None]
+    output = 0.3 * (force + np.array([0.02, -0.03, 0.04]))[..., axes]
+    tumble = Readings(force=force, output=output, time=np.arange(24.0)[None], unit_name="V", axes=axes)
+    assert tumble.scale == pytest.approx(0.3, rel=0.05)
