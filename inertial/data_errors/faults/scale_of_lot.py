@@ -17,12 +17,9 @@ def scale_units(readings: Readings) -> Iterator[Fault]:
         ratio = float(scale[unit]) / others
         if not 0.75 < ratio < 1.33:
             octaves = np.log2(ratio)
-            power_of_two = abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4
+            octave = abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4
             yield Fault(
-                "wrong_range" if power_of_two else "wrong_units",
-                unit,
-                (),
-                f"scale is {ratio:.4g} times that of the lot",
+                "wrong_range" if octave else "wrong_units", unit, (), f"scale is {ratio:.4g} times that of the lot"
             )
 
 
