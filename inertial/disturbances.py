@@ -62,9 +62,7 @@ def disturbances(record: Array) -> list[Disturbance]:
     spread = max(_spread(quick), _spread(np.diff(record)) / np.sqrt(2.0))
     far = np.abs(quick) > FAR * spread if spread > 0.0 else np.zeros(record.size, dtype=bool)  # 0: coarse digits
     rest = np.where(far, 0.0, quick)
-    found = [
-        Disturbance("stuck", stretch.start, stretch.stop, stretch.count, 0.0) for stretch in frozen(record[:, None])
-    ]
+    found = [Disturbance("stuck", run.start, run.stop, run.count, 0.0) for run in frozen(record[:, None])]
     found += _louder(_bursts(far) | _loud(rest), quick)
     within: Flags = np.zeros(record.size, dtype=bool)
     for disturbance in found:
@@ -84,8 +82,7 @@ def disturbance_texts(found: Sequence[Disturbance], rate_hz: float, unit: str) -
     """What is said of the disturbances of a channel sampled at ``rate_hz``, a text for each kind; ``unit``: of the record."""
     texts: list[str] = []
     for kind, of_kind in (
-        (kind, [disturbance for disturbance in found if disturbance.kind == kind])
-        for kind in dict.fromkeys(disturbance.kind for disturbance in found)
+        (kind, [item for item in found if item.kind == kind]) for kind in dict.fromkeys(item.kind for item in found)
     ):
         first, more = of_kind[0], f" (and {len(of_kind) - 1} more)" if len(of_kind) > 1 else ""
         start, stop, size = first.start / rate_hz, first.stop / rate_hz, f"{first.size:+.3g} {unit}".strip()

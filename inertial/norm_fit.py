@@ -242,10 +242,8 @@ class _Work:
                 ]
                 record[unit] = np.sqrt(np.sum(square, axis=0))
             for axis in range(3):
-                of_axis = np.flatnonzero(indices[:, 0] == axis)
-                covariance[unit, axis][np.ix_(indices[of_axis, 1], indices[of_axis, 1])] = joint[
-                    np.ix_(of_axis, of_axis)
-                ]
+                here = np.flatnonzero(indices[:, 0] == axis)
+                covariance[unit, axis][np.ix_(indices[here, 1], indices[here, 1])] = joint[np.ix_(here, here)]
             nonlinear[unit] = np.sqrt(np.maximum(np.diagonal(joint)[free:], 0.0))
         errors: dict[str, dict[str, float]] = {}
         for k, (effect, name) in enumerate(self.parameters()):

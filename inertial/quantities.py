@@ -232,9 +232,7 @@ def attribute_drivers() -> dict[str, str]:
     for row in RECORDED:
         if row.driver and row.attribute:
             attributes[row.column] = row.attribute
-        attributes |= {
-            derived.name: derived.attribute for derived in DERIVED if derived.driver and derived.column == row.column
-        }
+        attributes |= {item.name: item.attribute for item in DERIVED if item.driver and item.column == row.column}
     return attributes
 
 
@@ -261,11 +259,7 @@ def formula_names() -> dict[str, tuple[str, float, str]]:
         if row.formula:
             names[row.formula] = (row.attribute, row.formula_factor, row.meaning)
             names[row.column] = (row.attribute, 1.0, row.column_meaning)
-        names |= {
-            derived.formula: (derived.attribute, 1.0, derived.meaning)
-            for derived in DERIVED
-            if derived.column == row.column
-        }
+        names |= {item.formula: (item.attribute, 1.0, item.meaning) for item in DERIVED if item.column == row.column}
     return names
 
 

@@ -9,7 +9,7 @@ from numpy.random import Generator
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.drivers import Driver, Misfit, looks_of, misfits_of_drivers
+from inertial.criticism.drivers import Driver, Misfit, looks_of, misfits
 from inertial.criticism.evidence import Evidence, evidence
 from inertial.criticism.examination import Named, worst
 from inertial.criticism.field import Candidates
@@ -83,7 +83,7 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     where = (
         ()
         if silent
-        else misfits_of_drivers(
+        else misfits(
             problem, drivers, base.at(beside.noise), beside.space.variance, _beyond_pose(base, drivers, beside)
         )
     )

@@ -212,7 +212,7 @@ _OF_POSE = frozenset({"pose", "approach", "outer_deg", "inner_deg"})
 """Drivers that are the pose, or how it was reached."""
 
 
-def misfits_of_drivers(
+def misfits(
     problem: Problem, drivers: list[Driver], space: Space, floor_variance: float, beyond: Space
 ) -> list[Misfit]:
     """Drivers of the residuals of a space, most significant first.
@@ -226,18 +226,18 @@ def misfits_of_drivers(
     beyond : the same residuals after any dependence on the pose
     """
     excess = max(space.rss - space.dof * floor_variance, 1e-12)
-    misfits: list[Misfit] = []
+    found: list[Misfit] = []
     for driver in drivers:
         gain = (space if driver.name in _OF_POSE else beyond).gain(driver.candidate)
         drop, rank = float(gain.drop[0]), int(gain.rank[0])
         if rank:
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
-            misfits.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
+            found.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
     # two clocks of a run explain equally much: their order must not depend on rounding errors
-    misfits.sort(key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
+    found.sort(key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
     best: dict[str, Misfit] = {}
-    for misfit in misfits:
+    for misfit in found:
         best.setdefault(misfit.driver, misfit)  # of its bias, its axes and its transfer curve what follows it most
     return list(best.values())
 

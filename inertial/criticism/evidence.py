@@ -109,9 +109,7 @@ def condition(model: Model) -> float:
 
 def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int] | None]:
     """Jackknife of the bias, its largest change by leaving out one dwell, and which unit and dwell that is."""
-    columns = next(
-        (bias_columns for term, bias_columns in model.slices(shared=False) if term.effect.id == "bias"), None
-    )
+    columns = next((at for term, at in model.slices(shared=False) if term.effect.id == "bias"), None)
     if columns is None:
         return None, None, None
     space, axes = model.space, model.problem.per_unit

@@ -175,9 +175,7 @@ class _Parts:
             if fold is None:
                 return None
             py, pz = group.py[:, dwells], group.pz[:, dwells]
-            density += (
-                0.5 * fold.log_det - 0.5 * fold.off.size * np.log(2.0 * np.pi) - 0.5 * float(np.sum(py * fold.off))
-            )
+            density += 0.5 * (fold.log_det - fold.off.size * np.log(2.0 * np.pi) - float(np.sum(py * fold.off)))
             inner -= np.einsum("bkq,bkr->qr", pz, fold.across)
             right += np.einsum("bkq,bk->q", pz, fold.off)
             held.append((group, dwells, fold))

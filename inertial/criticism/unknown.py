@@ -143,11 +143,8 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
         return None  # more than two effects in place of one curve have no priority
     # a memory for itself, too: what it leaves over, of inexact shape, is often chosen beside it
     rivals = [t for t in replaced if t.effect.memory or len(replaced) == 1]
-    return (
-        None
-        if any(_nearly_as_good(base, [*remaining, t], base_cost - best.cost) for t in rivals)
-        else (best, remaining)
-    )
+    priority = any(_nearly_as_good(base, [*remaining, t], base_cost - best.cost) for t in rivals)
+    return None if priority else (best, remaining)
 
 
 def _nearly_as_good(base: Model, terms: Sequence[Term], gain: float) -> bool:

@@ -33,17 +33,17 @@ class DriverSums:
 
     @property
     def labels(self) -> list[str]:
-        """Of the g levels."""
+        """Names of the g levels."""
         return list(self.levels)
 
     @cached_property
     def score(self) -> Array:
-        """(g, h), once all lots are in."""
+        """Scores (g, h) of the levels; read after the last lot was added."""
         return np.stack([score for score, _ in self.levels.values()])
 
     @cached_property
     def information(self) -> Array:
-        """(g, h), once all lots are in."""
+        """Information (g, h) of the levels; read after the last lot was added."""
         return np.stack([information for _, information in self.levels.values()])
 
     @property
@@ -52,7 +52,7 @@ class DriverSums:
         return self.inside > self.between
 
     def add(self, label: str, score: Array, information: Array, units: int) -> None:
-        """Add to a level."""
+        """Add scores and information (h,) of some units to a level."""
         self.levels.setdefault(label, np.zeros((2, score.size)))
         self.levels[label] += score, information
         self.units[label] += units

@@ -116,10 +116,7 @@ class Pool:
                 # what other names leave over is named only where it had an alarm itself, and stands out
                 and (not found or ((name, effect) in alarmed and score > needed + CLASS_WIDTH))
             ]
-            name = next(
-                (candidate for candidate in self._in_order(pairs, sums, scores) if not self._told(found, candidate)),
-                None,
-            )
+            name = next((named for named in self._in_order(pairs, sums, scores) if not self._told(found, named)), None)
             if name is None or len(found) == _MOST:
                 break
             found.append(name)

@@ -36,7 +36,7 @@ class Sums:
 
     @classmethod
     def of(cls, count: int, *, two_sided: bool, effects: Places | None = None) -> "Sums":
-        """Sums without a lot."""
+        """Sums before the first lot, for ``count`` hypotheses."""
         size = count + (0 if effects is None else int(effects.max(initial=-1)) + 1)
         return cls(np.zeros(size), np.zeros(size), two_sided, effects)
 
@@ -110,7 +110,7 @@ class Scale:
 
     @property
     def rms(self) -> Array:
-        """(h,)."""
+        """Root mean square (h,) of the values so far."""
         return np.sqrt(self.squares / self.n)
 
     def bounded(self, value: Array) -> Array:
@@ -119,6 +119,6 @@ class Scale:
         return np.clip(value, -limit, limit)
 
     def add(self, value: Array) -> None:
-        """Take a bounded value in; zero says nothing."""
+        """Add a bounded value (h,); zeros are not counted."""
         self.squares += value**2
         self.n += value != 0.0

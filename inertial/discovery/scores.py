@@ -168,9 +168,7 @@ def _tempco(model: Model) -> Array:
         return np.full(problem.blocks, np.nan)
     shared = model.shared @ space.shared_sizes if model.shared.shape[-1] else np.zeros_like(problem.y)
     white = space.whiten(np.concatenate([model.local, (problem.y - shared)[..., None]], axis=-1))
-    return np.array(
-        [np.linalg.lstsq(white_block[:, :-1], white_block[:, -1], rcond=None)[0][column] for white_block in white]
-    )
+    return np.array([np.linalg.lstsq(block[:, :-1], block[:, -1], rcond=None)[0][column] for block in white])
 
 
 def _inverse(information: Array) -> Array:

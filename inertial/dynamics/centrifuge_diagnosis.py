@@ -87,9 +87,7 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
 
 def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence[str] = DEFAULT) -> SpinDiagnosis:
     """The verdict on bias, scale and ``effects``, with the classes of effects that make the model adequate."""
-    judged, _ = judge_points(
-        len(output), lambda sound: _judged(points.picked(sound), output[sound], error[sound], effects)
-    )
+    judged, _ = judge_points(len(output), lambda rows: _judged(points.picked(rows), output[rows], error[rows], effects))
     before, after = (float(np.sqrt(np.mean(fit.residuals**2))) for fit in (judged.fit, judged.extended))
     again = tuple(f"measure {points.acceleration[k]:+.4g} g again: it departs alone" for k in judged.alone)
     return SpinDiagnosis(

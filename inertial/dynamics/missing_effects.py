@@ -126,10 +126,8 @@ class BadPoint(Generic[AnyFit]):
 
 def breakers_of(classes: Sequence[EffectClass], effects: Mapping[str, DynamicEffect]) -> tuple[str, ...]:
     """The measurements that separate the first two members of each class of several effects."""
-    open_classes = [effect_class for effect_class in classes if len(effect_class.effects) > 1]
-    return tuple(
-        dict.fromkeys(effects[name].breaker for effect_class in open_classes for name in effect_class.effects[:2])
-    )
+    open_classes = [group for group in classes if len(group.effects) > 1]
+    return tuple(dict.fromkeys(effects[name].breaker for group in open_classes for name in group.effects[:2]))
 
 
 def judge(

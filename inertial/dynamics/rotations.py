@@ -47,11 +47,9 @@ class Rotations:
     def later(self, delay: Array) -> "Rotations":
         """The points where the table is ``delay`` s (outer, inner) after the encoder's readings."""
         ahead = self.rate * np.where(self.inner_turns > 0, delay[1], delay[0])
-        about_inner = self.inner_turns > 0
+        inner = self.inner_turns > 0
         return replace(
-            self,
-            outer=self.outer + np.where(about_inner, 0.0, ahead),
-            inner=self.inner + np.where(about_inner, ahead, 0.0),
+            self, outer=self.outer + np.where(inner, 0.0, ahead), inner=self.inner + np.where(inner, ahead, 0.0)
         )
 
 

@@ -194,8 +194,7 @@ def _errors(design: Callable[[Array], Array], x: Array, c: Array) -> Array:
 def residual_percent(record: ShockRecord, left: Sequence[Array]) -> float:
     """Rms residual of the shocks, in % of the peak of each."""
     squares = [
-        np.mean(residual**2) / np.max(np.abs(shock.unit)) ** 2
-        for residual, shock in zip(left, record.shocks, strict=True)
+        np.mean(series**2) / np.max(np.abs(shock.unit)) ** 2 for series, shock in zip(left, record.shocks, strict=True)
     ]
     return float(100.0 * np.sqrt(np.mean(squares)))
 

@@ -136,7 +136,7 @@ def _judged(points: Points, effects: Sequence[str]) -> Judged[TransferFit]:
         ), worst
 
     located = [
-        name for name, effect in EFFECTS.items() if any(p.unit == "Hz" for p in effect.parameters(points.conditions))
+        name for name, kind in EFFECTS.items() if any(p.unit == "Hz" for p in kind.parameters(points.conditions))
     ]
     base = best_of_exchange(points, fit_transfer(points, effects))[0]
     return judge(

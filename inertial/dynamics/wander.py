@@ -197,9 +197,7 @@ def wander_posterior(
         logs[k] = prior - 0.5 * np.sum(np.log(total) + (turn.T @ contrasts) ** 2 / total, axis=1)
     shares = WALK_SHARES[:, None] * variance
     sides = ((variance - shares) / sizes[0]).ravel(), (shares / sizes[1]).ravel()
-    log = logs.ravel() + sum(
-        strength.log_likelihood(np.sqrt(side)) for strength, side in zip(known, sides, strict=False)
-    )
+    log = logs.ravel() + sum(term.log_likelihood(np.sqrt(side)) for term, side in zip(known, sides, strict=False))
     weight = np.exp(log - log.max())
     return Posterior(*sides, np.asarray(weight / weight.sum(), dtype=np.float64))
 

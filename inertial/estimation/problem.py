@@ -151,7 +151,7 @@ class Problem:
                     effect,
                     values,
                     self.axes,
-                    lambda axis, nonlinear: excited(effect, effect.columns(state, axis, **nonlinear)),
+                    lambda axis, of_axis: excited(effect, effect.columns(state, axis, **of_axis)),
                 )
             )
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
@@ -165,9 +165,7 @@ class Problem:
         state = self.lot.state
         if isinstance(effect, SensorEffect):
             return self._by_axis(
-                _of_axes(
-                    effect, values, self.axes, lambda axis, nonlinear: effect.start_columns(state, axis, **nonlinear)
-                )
+                _of_axes(effect, values, self.axes, lambda axis, of_axis: effect.start_columns(state, axis, **of_axis))
             )
         return self.seen(effect.start_change(state, **on_axis(values, 0)))
 

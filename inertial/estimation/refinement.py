@@ -77,7 +77,7 @@ def _between_choices(space: Space, problem: Problem, term: Term, parameter: Nonl
     value = float(np.mean(term.keywords[parameter.name]))
     values = parameter.between(value)
     while values.size:
-        step = -(-values.size // _PLACES)
+        step = -(-values.size // _POINTS)
         some = values[::step]
         best = int(np.argmax(_varied(space, problem, term, parameter, some).drop))
         value = float(some[best])
@@ -230,7 +230,7 @@ def intervals(model: Model) -> dict[str, dict[str, tuple[float, float]]]:
     return by_effect
 
 
-_PLACES = 81
+_POINTS = 81
 """Values over the range of a parameter at which its profile is computed; as many again around the best."""
 
 
@@ -238,15 +238,15 @@ def _profile(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -
     """Values of a parameter over its range, denser around the best one, with that of the term; the reduction of χ² at each."""
     low, high = sorted((on_scale(parameter, parameter.low), on_scale(parameter, parameter.high)))
     fitted = on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
-    coarse = np.append(np.linspace(low, high, _PLACES), fitted)
+    coarse = np.append(np.linspace(low, high, _POINTS), fitted)
 
     def drop(scaled: Array) -> Array:
         values = np.array([_off_scale(parameter, float(v)) for v in scaled])
         return _varied(space, problem, term, parameter, values).drop
 
     first = drop(coarse)
-    centre, cell_ = coarse[int(np.argmax(first))], (high - low) / (_PLACES - 1)
-    fine = np.clip(np.linspace(centre - cell_, centre + cell_, _PLACES), low, high)
+    centre, cell_ = coarse[int(np.argmax(first))], (high - low) / (_POINTS - 1)
+    fine = np.clip(np.linspace(centre - cell_, centre + cell_, _POINTS), low, high)
     scaled = np.concatenate([coarse, fine])
     values = np.array([_off_scale(parameter, float(v)) for v in scaled])
     return values, np.concatenate([first, drop(fine)])

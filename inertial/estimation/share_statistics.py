@@ -235,12 +235,7 @@ def _factorised(products: Array) -> Left | None:
 
 
 def _beside_common(products: Array, rank: int, scale: Array) -> Left | None:
-    """What columns leave of measurements where all blocks share the coefficients of those after the first ``rank``.
-
-    Parameters
-    ----------
-    products : as of :func:`_factorised`; scale : as of ``left``
-    """
+    """As :func:`_factorised` where all blocks share the coefficients after the first ``rank``; ``scale`` as of ``left``."""
     size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
     unit = products / (size[:, :, None] * size[:, None, :])
     inner, across = unit[:, :rank, :rank], unit[:, :rank, rank:]

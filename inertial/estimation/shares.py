@@ -17,7 +17,7 @@ from inertial.estimation.noise_shares import LONGEST, Shares
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Space
 
-LatticePoint = tuple[int | None, int | None]
+Point = tuple[int | None, int | None]
 
 _STRIDES = (4, 2, 1)
 """Half decades, quarters, eighths."""
@@ -44,10 +44,10 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
     near : start; 1/f of three times the white variance if None; shares of single blocks stay as they are
     finest : smallest stride, in eighths of a decade
     """
-    known: dict[LatticePoint, float] = {}
+    known: dict[Point, float] = {}
     by_block = () if near is None else near.by_block
 
-    def at(point: LatticePoint) -> float:
+    def at(point: Point) -> float:
         if point not in known:
             known[point] = deviance(shares_at(point, by_block))
         return known[point]
@@ -97,7 +97,7 @@ def _beside(k: int | None, stride: int, middle: int | None) -> list[int | None]:
     return [k - stride if k - stride >= LEAST_SHARE else None, *([k + stride] if k + stride <= LARGEST_SHARE else [])]
 
 
-def nearest_point(shares: Shares) -> LatticePoint:
+def nearest_point(shares: Shares) -> Point:
     """The point of the lattice nearest to shares."""
     first, second = (
         None if s <= 10.0 ** ((LEAST_SHARE - 4) / SHARE_STEP) else _inside(round(SHARE_STEP * np.log10(s)))
@@ -106,7 +106,7 @@ def nearest_point(shares: Shares) -> LatticePoint:
     return first, second
 
 
-def shares_at(point: LatticePoint, by_block: tuple[tuple[int, float, float], ...] = ()) -> Shares:
+def shares_at(point: Point, by_block: tuple[tuple[int, float, float], ...] = ()) -> Shares:
     """The shares at a point of the lattice, with those of blocks that have shares of their own."""
     flicker, walk = (0.0 if k is None else 10.0 ** (k / SHARE_STEP) for k in point)
     return Shares(flicker, walk, by_block)
@@ -116,13 +116,10 @@ def _inside(k: int) -> int:
     return min(max(k, LEAST_SHARE), LARGEST_SHARE)
 
 
-def _around(point: LatticePoint, stride: int) -> list[LatticePoint]:
+def _around(point: Point, stride: int) -> list[Point]:
     """Neighbours: each share up or down, one for the other; at the first stride also none, or appearing."""
     first, second = point
-    near: list[LatticePoint] = [
-        *((first, k) for k in _moved(second, stride)),
-        *((k, second) for k in _moved(first, stride)),
-    ]
+    near: list[Point] = [*((first, k) for k in _moved(second, stride)), *((k, second) for k in _moved(first, stride))]
     if first is not None and second is not None:
         ways = ((-stride, stride), (stride, -stride), (-stride, -stride), (stride, stride))
         near += [(_inside(first + flicker_step), _inside(second + walk_step)) for flicker_step, walk_step in ways]

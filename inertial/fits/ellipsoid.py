@@ -198,7 +198,7 @@ class _Sphere:
         return rows if self.whiten is None else self.whiten @ rows
 
     def _left(self, theta: Array) -> Array:
-        """Residuals (u, n), likewise."""
+        """Residuals (u, n), weighted where the noise of the norms is known."""
         return self.weighted(self.residuals(theta)[..., None])[..., 0]
 
 

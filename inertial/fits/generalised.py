@@ -315,5 +315,5 @@ def _solved(root: Array, columns: Array, *, transposed: bool = False) -> Array:
 
 
 def _log_sizes(triangle: Array) -> float:
-    """Logarithm of the determinant of a triangular matrix, less its sign."""
+    """ln|det| of a triangular matrix (n, n)."""
     return float(np.log(np.abs(np.diagonal(triangle))).sum())

@@ -51,13 +51,11 @@ def whitener_of_norms(residual: Array, rows: Array, direction: Array, time: Arra
         volume = np.log(np.diagonal(low)).sum() + np.log(np.abs(np.diagonal(triangle))).sum()
         return float((residual.size - rows.shape[1]) * np.log(left @ left) + 2.0 * volume)
 
-    best = min(
-        ((deviance((f, w)), (f, w)) for f in _SHARES.tolist() for w in _SHARES.tolist()), key=lambda found: found[0]
-    )
+    best = min(((deviance((f, w)), (f, w)) for f in _SHARES.tolist() for w in _SHARES.tolist()), key=lambda fit: fit[0])
     for step in _FINER:
         f, w = best[1]
         near = [(f * a, w * b) for a in (1.0 / step, 1.0, step) for b in (1.0 / step, 1.0, step)]
-        best = min([best, *((deviance(shares), shares) for shares in dict.fromkeys(near))], key=lambda found: found[0])
+        best = min([best, *((deviance(shares), shares) for shares in dict.fromkeys(near))], key=lambda fit: fit[0])
     return np.asarray(solve_triangular(root(*best[1]), np.eye(time.size), lower=True))
 
 

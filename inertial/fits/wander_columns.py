@@ -80,12 +80,7 @@ class LotColumns:
 
         Where the path takes up that state before the first dwell, the column is zero and its inverse, too: nothing is known.
         """
-        every = (
-            p
-            for model_effect in (*self._sensor, *self._station)
-            if model_effect.id == effect
-            for p in model_effect.parameters(self._state)
-        )
+        every = (p for e in (*self._sensor, *self._station) if e.id == effect for p in e.parameters(self._state))
         parameter = next(p for p in every if p.name == name)
         if not parameter.of_run:
             return error

@@ -66,12 +66,10 @@ def walk_kernel(time: Array, fitted: Flags | None = None) -> Array:
     record = time if fitted is None else time[..., fitted]
     first = time.min(axis=-1, keepdims=True)
     start = record.min(axis=-1, keepdims=True)
-    along, mean_variance = walk_mean(time, first, start, record.max(axis=-1, keepdims=True) - start)
+    along, of_mean = walk_mean(time, first, start, record.max(axis=-1, keepdims=True) - start)
     since = time - first
     shared = np.minimum(since[..., :, None], since[..., None, :])
-    return (shared - along[..., :, None] - along[..., None, :] + mean_variance[..., None]) / max(
-        float(np.ptp(time)), 1e-9
-    )
+    return (shared - along[..., :, None] - along[..., None, :] + of_mean[..., None]) / max(float(np.ptp(time)), 1e-9)
 
 
 def walk_mean(time: Array, since: _Time, start: _Time, length: _Time) -> tuple[Array, _Time]:
@@ -94,12 +92,12 @@ def flicker_mean(time: Array, constants: Array, start: float, length: float) -> 
     constants : (k,), time constants of the processes, s
     """
     inside = np.clip(time - start, 0.0, length)
-    along, mean_variance = np.zeros(time.shape), 0.0
+    along, of_mean = np.zeros(time.shape), 0.0
     for tau in constants.tolist():
         share = tau / max(length, 1e-9)
         along += share * (2.0 - np.exp(-inside / tau) - np.exp(-(length - inside) / tau))
-        mean_variance += 2.0 * share * (1.0 + share * float(np.expm1(-1.0 / share)))
-    return along / constants.size, mean_variance / constants.size
+        of_mean += 2.0 * share * (1.0 + share * float(np.expm1(-1.0 / share)))
+    return along / constants.size, of_mean / constants.size
 
 
 def against_mean(variance: Array, gain: Array, kind: tuple[Array, float]) -> Array:
@@ -112,8 +110,8 @@ def against_mean(variance: Array, gain: Array, kind: tuple[Array, float]) -> Arr
     ----------
     variance : (...), of the wander; gain : (..., n), g; kind : cov(v, m)/variance and var(m)/variance
     """
-    along, mean_variance = kind
-    return variance * (mean_variance - 2.0 * gain @ along)
+    along, of_mean = kind
+    return variance * (of_mean - 2.0 * gain @ along)
 
 
 def of_a_day(

@@ -53,27 +53,25 @@ def fit_terms(variance: Array, moments: Sums, threshold: float, only: str = "") 
     start = mixture.first_guess(variance, moments)
     while True:
         task, strengths, best = mixture.settled(variance, moments, allowed, np.where(allowed, start, 0.0))
-        needed, reduced, cost = _needed(task, strengths, best, allowed)
-        worth = (
-            {j: curve.worth(j) / bars[j] for j in np.flatnonzero(needed).tolist() if j != n} if needed.sum() > 1 else {}
-        )
+        used, reduced, cost = _needed(task, strengths, best, allowed)
+        worth = {j: curve.worth(j) / bars[j] for j in np.flatnonzero(used).tolist() if j != n} if used.sum() > 1 else {}
         doubtful = [j for j in worth if not worth[j] > 1.0]
         if not doubtful:
             break
         allowed[min(doubtful, key=lambda j: worth[j])] = False
-    task, strengths, best = mixture.settled(variance, moments, np.ones_like(needed), np.where(needed, reduced, 0.0))
-    low, high = np.zeros(needed.size), np.zeros(needed.size)
-    for j in [mixture.TERMS.index(only)] if only else range(needed.size):
-        if needed[j]:
+    task, strengths, best = mixture.settled(variance, moments, np.ones_like(used), np.where(used, reduced, 0.0))
+    low, high = np.zeros(used.size), np.zeros(used.size)
+    for j in [mixture.TERMS.index(only)] if only else range(used.size):
+        if used[j]:
             low[j], high[j] = _profile(task, strengths, best, j, threshold)
             low[j] = low[j] if low[j] > 0.0 else curve.low_end(j, float(reduced[j]), threshold)
         else:
             high[j] = _profile(task, strengths, best, j, _ONE_SIDED_95)[1]
-    if not needed[k] and only in {"", "K"}:
-        high[k] = max(high[k], _walk_limit(variance, moments, np.where(needed, reduced, 0.0)))
-    value = np.where(needed, reduced, np.nan)
-    low = np.fmin(low, np.where(needed, reduced, 0.0))
-    dof = float(variance.size - int(needed.sum()))
+    if not used[k] and only in {"", "K"}:
+        high[k] = max(high[k], _walk_limit(variance, moments, np.where(used, reduced, 0.0)))
+    value = np.where(used, reduced, np.nan)
+    low = np.fmin(low, np.where(used, reduced, 0.0))
+    dof = float(variance.size - int(used.sum()))
     return TermFit(value, low, np.fmax(high, np.nan_to_num(value)), curve.strengths, cost, dof)
 
 
@@ -144,12 +142,12 @@ class _Curve:
 
 def _needed(task: MixtureFit, strengths: Array, best: float, allowed: Flags) -> tuple[Flags, Array, float]:
     """Terms that stay after dropping, one by one, the one whose loss costs least, while that is little."""
-    needed = (strengths > 0.0) & allowed
-    current, cost = np.where(needed, strengths, 0.0), best
-    while needed.sum() > 1:
+    used = (strengths > 0.0) & allowed
+    current, cost = np.where(used, strengths, 0.0), best
+    while used.sum() > 1:
         trials: list[tuple[float, int, Array]] = []
-        for j in np.flatnonzero(needed).tolist():
-            fewer = needed.copy()
+        for j in np.flatnonzero(used).tolist():
+            fewer = used.copy()
             fewer[j] = False
             start = np.where(fewer, np.maximum(current, 1e-9 * current.max()), 0.0)
             fitted, worse = task.solve(fewer, start)
@@ -157,8 +155,8 @@ def _needed(task: MixtureFit, strengths: Array, best: float, allowed: Flags) -> 
         worse, j, fitted = min(trials, key=lambda trial: trial[0])
         if worse - cost > _KEPT_AT:
             break
-        needed[j], current, cost = False, fitted, worse
-    return needed, current, cost
+        used[j], current, cost = False, fitted, worse
+    return used, current, cost
 
 
 def _profile(task: MixtureFit, strengths: Array, best: float, j: int, threshold: float) -> tuple[float, float]:

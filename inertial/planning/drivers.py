@@ -50,14 +50,13 @@ def columns_of(state: State, effect: AnyEffect, values: dict[str, float], axis: 
 
 def begins_again(state: State, effect_id: str) -> bool:
     """Whether an effect's column restarts after a power cycle, compared with the same time under power."""
-    unit_state = first_unit(state)
+    plan = first_unit(state)
     step = SequenceStep(0.0, 0.0, 25.0)
     off, on = (
-        extended(unit_state, [replace(step, off=seconds)], StationPace(rest=_OFF_S - seconds))
-        for seconds in (_OFF_S, 0.0)
+        extended(plan, [replace(step, off=seconds)], StationPace(rest=_OFF_S - seconds)) for seconds in (_OFF_S, 0.0)
     )
     effect = catalogue.get(effect_id)
-    values = design.starting_values([effect], unit_state).get(effect.id, {})
+    values = design.starting_values([effect], plan).get(effect.id, {})
     ends = [columns_of(of, effect, values, axis)[-1] for of in (off, on) for axis in range(3)]
     return not np.allclose(np.concatenate(ends[:3]), np.concatenate(ends[3:]), rtol=1e-3, atol=1e-9)
 

@@ -68,13 +68,13 @@ def _inverse(matrix: Array) -> Array:
 
 
 def _d(matrix: Array) -> Array:
-    """Log of the geometric mean of the variances over the axes of the confidence ellipsoid."""
+    """D-criterion: log of the geometric mean of the variances over the axes of the confidence ellipsoid."""
     axes, p = matrix.shape[-3:-1]
     return -np.linalg.slogdet(matrix)[1].sum(axis=-1) / (axes * p)
 
 
 def _a(matrix: Array) -> Array:
-    """Log of the mean ratio of variance to required variance."""
+    """A-criterion: log of the mean ratio of variance to required variance."""
     return np.log(np.mean(ratios(matrix) ** 2, axis=(-2, -1)))
 
 

@@ -9,9 +9,7 @@ from inertial.arrays import NORMAL_MEDIAN, Array
 from inertial.population.memory import drawn_in, innovations, memories_of, memory_of
 
 FEWEST = 4  # points on either side
-LIKELY = (
-    7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the change lies with 95 % (Hansen 2000, table 1)
-)
+LIKELY = 7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which it lies with 95 % (Hansen 2000, table 1)
 DRAWN_IN = 4.0
 DOF_OF_DIFFERENCES = 1.3
 PLACES, GROWTH = 0.65, 0.68

@@ -35,16 +35,11 @@ def _exchanges(readings: Readings, dwell: int) -> Iterator[tuple[int, int]]:
     predicted = np.einsum("vip,up->uvi", readings.fits[there], design(readings.force[there, dwell]))
     scale = readings.scale[there]
     distance = np.linalg.norm((readings.output[there, dwell][:, None] - predicted) / scale[:, None, None], axis=-1)
-    own_distance = np.diag(distance)
+    to_own = np.diag(distance)
     best = np.argmin(distance, axis=1)
     for i, j in enumerate(best):
         mutual = j > i and best[j] == i
-        if (
-            mutual
-            and distance[i, j] < 0.2 * own_distance[i]
-            and distance[j, i] < 0.2 * own_distance[j]
-            and own_distance[i] > _AWAY
-        ):
+        if mutual and distance[i, j] < 0.2 * to_own[i] and distance[j, i] < 0.2 * to_own[j] and to_own[i] > _AWAY:
             yield int(there[i]), int(there[j])
 
 

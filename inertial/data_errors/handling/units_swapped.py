@@ -41,9 +41,9 @@ class UnitsSwapped(Handling):
 
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The difference of the readings of the two units, in the dwells."""
-        unit, partner, then = _places(lot, **location)
+        unit, other, then = _places(lot, **location)
         column = np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
-        column[[unit, partner], ..., 0] = (lot.output[[unit, partner]] - _of_other(lot, unit, partner)) * then[:, None]
+        column[[unit, other], ..., 0] = (lot.output[[unit, other]] - _of_other(lot, unit, other)) * then[:, None]
         return column
 
     def columns(self, lot: Lot, slope: Array | None, **location: float) -> Array:
@@ -51,26 +51,26 @@ class UnitsSwapped(Handling):
         return by_block(self.change(lot, slope, **location))
 
     def describe(self, lot: Lot, size: Array, **location: float) -> str:
-        unit, partner, then = _places(lot, **location)
-        apart = 1e6 * float(np.sqrt(np.mean((lot.output[unit, then] - _of_other(lot, unit, partner)[0, then]) ** 2)))
+        unit, other, then = _places(lot, **location)
+        apart = 1e6 * float(np.sqrt(np.mean((lot.output[unit, then] - _of_other(lot, unit, other)[0, then]) ** 2)))
         back = int(location["until"] - location["dwell"])
         back = "" if location["until"] >= then.size else f" for {back} dwells"
         return f"exchanged before this dwell{back}, readings {apart:.0f} µg apart; they are exchanged back"
 
     def settled(self, lot: Lot, size: Array, misfit: Misfit, **location: float) -> Lot | None:
         """With the readings exchanged back: the temperatures, too, if the model fits better with them."""
-        unit, partner, _ = _places(lot, **location)
+        unit, other, _ = _places(lot, **location)
         outputs = _outputs_exchanged(lot, **location)
         both = replace(outputs, state=_temperatures_exchanged(lot.state, **location))
-        misfits = [misfit(each.units([unit, partner]), (unit, partner), own_noise=True) for each in (outputs, both)]
+        misfits = [misfit(each.units([unit, other]), (unit, other), own_noise=True) for each in (outputs, both)]
         return outputs if misfits[0] <= misfits[1] else both
 
 
 def _places(lot: Lot, **location: float) -> tuple[int, int, Flags]:
     """The two units, and the dwells (n,) in which both were measured as the other."""
-    unit, partner = int(location["unit"]), int(location["other"])
-    there = np.isfinite(lot.error[[unit, partner]]).all(axis=(0, 2))
-    return unit, partner, there & _within(lot.state.time.shape[1], **location)
+    unit, other = int(location["unit"]), int(location["other"])
+    there = np.isfinite(lot.error[[unit, other]]).all(axis=(0, 2))
+    return unit, other, there & _within(lot.state.time.shape[1], **location)
 
 
 def _within(n: int, **location: float) -> Flags:
@@ -81,26 +81,22 @@ def _within(n: int, **location: float) -> Flags:
 def _plain_fit(lot: Lot) -> PlainFit:
     """The fit by which pairs are found."""
     there = np.all(np.isfinite(lot.error), axis=-1)
-    return PlainFit(
-        lot.output, lot.state.force, lot.state.theta, there, lambda unit, partner: _of_other(lot, unit, partner)
-    )
+    return PlainFit(lot.output, lot.state.force, lot.state.theta, there, lambda a, b: _of_other(lot, a, b))
 
 
-def _of_other(lot: Lot, unit: int, partner: int) -> Array:
+def _of_other(lot: Lot, unit: int, other: int) -> Array:
     """Outputs (2, n, 3) of two units, each as that of the other: over the other's nominal scale; g."""
-    outputs = lot.output[[partner, unit]]
-    return (
-        outputs if lot.scale is None else outputs * (lot.scale[[partner, unit]] / lot.scale[[unit, partner]])[:, None]
-    )
+    outputs = lot.output[[other, unit]]
+    return outputs if lot.scale is None else outputs * (lot.scale[[other, unit]] / lot.scale[[unit, other]])[:, None]
 
 
 def _outputs_exchanged(lot: Lot, **location: float) -> Lot:
     """The lot with the outputs of two units exchanged in the dwells, and what is known of their noise."""
-    unit, partner, then = _places(lot, **location)
+    unit, other, then = _places(lot, **location)
     output, error = lot.output.copy(), lot.error.copy()
-    pair, here = [unit, partner], then[:, None]
-    output[pair] = np.where(here, _of_other(lot, unit, partner), lot.output[pair])
-    error[pair] = np.where(here, lot.error[[partner, unit]], lot.error[pair])
+    pair, here = [unit, other], then[:, None]
+    output[pair] = np.where(here, _of_other(lot, unit, other), lot.output[pair])
+    error[pair] = np.where(here, lot.error[[other, unit]], lot.error[pair])
     return replace(lot, output=output, error=error)
 
 
