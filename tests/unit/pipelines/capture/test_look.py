@@ -27,11 +27,11 @@ class Told:
     def due(self, record: int) -> bool:
         return record in self.looks
 
-    def look(self, record: int, told: frozenset[str]) -> Look:
+    def look(self, record: int, reported: frozenset[str]) -> Look:
         self.asked.append(record)
         own = self.looks[record]
         return Look(
-            own.known, own.text, {u: f for u, f in own.fails.items() if u not in told}, own.given_up, own.dwell_s
+            own.known, own.text, {u: f for u, f in own.fails.items() if u not in reported}, own.given_up, own.dwell_s
         )
 
 
