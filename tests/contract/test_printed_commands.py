@@ -1,7 +1,4 @@
-"""Every command that a message, a page or a line under "Next" names: it exists, with its options, wherever it stands in the code.
-
-What is printed under "Next" is run in ``tests/e2e/test_next_lines.py``.
-"""
+"""Every command that a message, a page or a line under "Next" names: it exists, with its options, wherever it stands."""
 
 import ast
 import re

@@ -1,7 +1,4 @@
-"""A recording made elsewhere all the way, as commands: import, diagnose, extend, fit, history, export, report, certificate.
-
-Without a statement of its references it is noise only and gets no certificate; with one it has a budget and may be certified.
-"""
+"""A recording made elsewhere all the way, as commands: import, diagnose, extend, fit, history, export, report, certificate."""
 
 import json
 from pathlib import Path

@@ -1,8 +1,4 @@
-"""The commands that are printed to be given next run as they are printed, in their order.
-
-The modules that print such commands are discovered: each has a case here, or its lines are run by the test that is named in
-``ELSEWHERE``.
-"""
+"""The commands that are printed to be given next run as they are printed, in their order, whichever module prints them."""
 
 import ast
 import re

@@ -1,8 +1,4 @@
-"""What ships, works at the first try: every recipe and station file of ``deploy`` by the commands that a page names for it.
-
-The commands that are printed, as such or within a message, are pasted. The fast part measures the procedures and the quickest
-recipe; the slow part measures every recipe, and every station file with the quickest one.
-"""
+"""What ships, works at the first try: every recipe and station file of ``deploy`` by the commands that a page names for it."""
 
 import re
 import shlex

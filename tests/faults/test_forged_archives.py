@@ -1,7 +1,4 @@
-"""Archives that somebody forged: what ``verify`` finds, and what ``certify``, ``export``, ``query`` and ``lineage`` do with them.
-
-One small archive of two runs, with certificates, is made once without a key and once with one; each forgery works on a copy.
-"""
+"""Archives that somebody forged: what ``verify`` finds, and what certificates, exports, queries and lineage do with them."""
 
 import json
 import shutil
