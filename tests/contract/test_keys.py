@@ -50,4 +50,4 @@ def test_the_command_prints_a_list_within_80_columns_and_refuses_an_unknown_one(
     assert document["subject"] == subject
     assert document["rows"]
     assert max(map(len, given(*words, columns=80)[1].splitlines())) <= 80
-    assert "did you mean" in refused("plan", "keys", f"{subject or 'recipe'}s")
+    assert f"did you mean {subject or 'recipe'}" in refused("plan", "keys", f"{subject or 'recipe'}s")

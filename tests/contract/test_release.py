@@ -94,6 +94,8 @@ def test_a_release_has_its_hashes_and_nothing_of_an_earlier_one(
     bom = json.loads(next(folder.glob("*.cdx.json")).read_text(encoding="utf-8"))
     assert bom["metadata"]["timestamp"] == "1970-01-01T00:00:00Z"
     assert any("a.whl" in one["value"] for one in bom["metadata"]["component"]["properties"])
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    assert release_time() == datetime(1970, 1, 2, tzinfo=UTC)
     monkeypatch.delenv("SOURCE_DATE_EPOCH")
     assert abs((release_time() - datetime.now(UTC)).total_seconds()) < 60.0
 
