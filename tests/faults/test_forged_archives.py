@@ -346,6 +346,7 @@ def test_one_edited_file_gives_one_finding_with_its_consequences(root: Path) -> 
         place.write_bytes(files.json_bytes({**json.loads(data), "who": "somebody else"}))
         [finding] = verify(Archive(root), keys=public_keys()).checked.findings
         assert finding.path.endswith(f"/{name}.json")
+        assert finding.kind == ("signature" if public_keys() else "edited")
         assert len(finding.consequences) >= 2
         place.write_bytes(data)
     shutil.rmtree(runs(root)[0].path)
