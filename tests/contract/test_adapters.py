@@ -74,14 +74,10 @@ def test_an_axis_goes_where_it_is_told_stops_and_refuses_what_it_may_not_do(name
         with pytest.raises(OperatorNeeded, match="home"):
             axis.start(10.0)
         assert axis.position() == pytest.approx(40.0, abs=max(0.01, axis.resolution_deg))
-
-
-@each(["smc_lecp6", "iai_robo_cylinder"])
-def test_an_emergency_stop_at_the_drive_needs_a_person(name):
-    with opened(axis=name) as (station, plant):
-        plant.emergency_stop = True
-        with pytest.raises(OperatorNeeded, match="emergency stop"):
-            station.table.move(10.0, 0.0)
+        if name in {"smc_lecp6", "iai_robo_cylinder"}:
+            plant.outer.homed = plant.emergency_stop = True
+            with pytest.raises(OperatorNeeded, match="emergency stop"):
+                station.table.move(10.0, 0.0)
 
 
 @each(CONTROLLERS)
@@ -103,6 +99,9 @@ def test_a_chamber_gets_where_it_is_told_refuses_what_is_not_allowed_and_switche
             with pytest.raises(StationRefused, match="has no writable mode"):
                 chamber.off()
             return
+        if name == "binder_mb1":  # both are written because sources disagree
+            both = [plant.banks[3]._sources[one]() for one in ("set_point_basic", "set_point_manual")]
+            assert both == pytest.approx([-12.3, -12.3], abs=0.051)
         chamber.off()
         assert not plant.fixture.chamber.running
         chamber.on()
@@ -201,30 +200,21 @@ def test_nothing_ever_writes_the_set_points_of_an_eurotherm_that_wear_its_memory
     assert [address for _, address, _ in recorder.written].count(276) == 1  # enabled after the first set point
 
 
-def test_both_set_points_of_a_binder_mb1_are_written_because_sources_disagree():
-    with opened(chamber="binder_mb1") as (station, plant):
-        station.chamber.set_temperature(33.0)
-        bank = plant.banks[3]
-        assert [bank._sources[name]() for name in ("set_point_basic", "set_point_manual")] == [33.0, 33.0]
-
-
-def test_an_iai_drive_is_given_band_speed_and_acceleration_before_its_target():
-    with opened(axis="iai_robo_cylinder") as (station, _):
-        registers = station.table.axes["outer"]._registers
-        registers._link = recorder = Recorder(registers._link)
-        station.table.move(10.0, 0.0)
-    holding = [address for space, address, _ in recorder.written if space == "holding"]
-    assert holding == [0x9902, 0x9900]
-
-
-def test_an_smc_drive_gets_its_start_alone_and_last():
-    with opened(axis="smc_lecp6") as (station, _):
-        registers = station.table.axes["outer"]._registers
-        registers._link = recorder = Recorder(registers._link)
-        station.table.move(10.0, 0.0)
-        station.table.move(20.0, 0.0)
-    assert [w for w in recorder.written if w[0] == "holding"] == [("holding", 0x9102, 16), ("holding", 0x9100, 1)] * 2
-    assert [w for w in recorder.written if w[0] == "coil"] == [("coil", 0x30, 1), ("coil", 0x19, 1)]
+def test_an_iai_drive_has_its_band_before_its_target_and_an_smc_drive_its_start_alone_and_last():
+    written = {}
+    for name in ("iai_robo_cylinder", "smc_lecp6"):
+        with opened(axis=name) as (station, _):
+            registers = station.table.axes["outer"]._registers
+            registers._link = recorder = Recorder(registers._link)
+            station.table.move(10.0, 0.0)
+            station.table.move(20.0, 0.0)
+        written[name] = recorder.written
+    assert [at for space, at, _ in written["iai_robo_cylinder"] if space == "holding"] == [0x9902, 0x9900] * 2
+    assert [w for w in written["smc_lecp6"] if w[0] == "holding"] == [
+        ("holding", 0x9102, 16),
+        ("holding", 0x9100, 1),
+    ] * 2
+    assert [w for w in written["smc_lecp6"] if w[0] == "coil"] == [("coil", 0x30, 1), ("coil", 0x19, 1)]
 
 
 STARTS = {"oriental_az": 0x58, "smc_lecp6": 0x9100, "iai_robo_cylinder": 0x9900, "universal_robots": 131}
@@ -259,21 +249,17 @@ def with_order(config, order):
 
 
 @each(ORDERS)
-def test_a_drive_may_be_set_to_any_of_four_word_orders(order):
+def test_a_drive_may_be_set_to_any_of_four_word_orders_and_does_not_move_in_another(order):
     config, lot = with_order(station_with(), order), lot_of(1)
     plant = make_plant(config, lot)
     with serve_plant(config, lot, plant) as station:
         station.table.move(70.0, -30.0)
     assert plant.outer.move.target == pytest.approx(70.0)
-
-
-@each(ORDERS[1:])
-def test_a_drive_set_to_another_word_order_than_the_file_says_does_not_move(order):
-    lot = lot_of(1)
-    plant = make_plant(station_with(), lot)
-    with serve_plant(with_order(station_with(), order), lot, plant) as station, pytest.raises(STATION_ERRORS):
-        station.table.move(70.0, -30.0)
-    assert plant.outer.move.target == 0.0
+    if order != ORDERS[0]:  # than the file says
+        plant = make_plant(station_with(), lot)
+        with serve_plant(config, lot, plant) as station, pytest.raises(STATION_ERRORS):
+            station.table.move(70.0, -30.0)
+        assert plant.outer.move.target == 0.0
 
 
 def test_a_profile_without_what_its_adapter_needs_is_refused_by_name():

@@ -74,7 +74,10 @@ def test_the_help_of_a_subcommand_shows_two_examples_of_its_own(name: str) -> No
             command.make_context(own, rest)
 
 
-def test_help_needs_eighty_columns_at_most_and_breaks_no_option() -> None:
+def test_help_needs_eighty_columns_breaks_no_option_and_its_parts_stand_together() -> None:
+    parts = [command.part for command in COMMANDS.values()]
+    assert min(Counter(parts).values()) > 1  # a part of one command is a heading mistyped
+    assert sum(one != other for one, other in pairwise(parts)) == len(set(parts)) - 1
     for name in COMMANDS:
         group = get_command(app).get_command(None, name)._load()
         subcommands = [[name, own] for own in getattr(group, "commands", {})]
@@ -97,12 +100,6 @@ def meant(command: object, rest: list[str]) -> tuple[TyperCommand, list[str]]:
     if rest and rest[0] in below:
         return below[rest[0]], rest[1:]
     return below[command.usual], rest
-
-
-def test_a_part_of_the_help_has_several_commands_that_stand_together() -> None:
-    parts = [command.part for command in COMMANDS.values()]
-    assert min(Counter(parts).values()) > 1  # a part of one command is a heading mistyped
-    assert sum(one != other for one, other in pairwise(parts)) == len(set(parts)) - 1
 
 
 def test_one_file_is_a_command(tmp_path: Path) -> None:

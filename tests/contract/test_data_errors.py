@@ -88,10 +88,6 @@ def test_an_error_of_handling_is_whole_in_its_file(name: str) -> None:
     assert lacks_as_handling(import_module(name), exchanged_lot()) == []
 
 
-def test_every_file_is_an_alternative() -> None:
-    assert sorted(type(one).__module__ for one in handling.alternatives()) == HANDLING
-
-
 def test_an_error_of_handling_that_is_half_there_is_told_with_what_it_lacks() -> None:
     half = ModuleType("half")
     lot = exchanged_lot()
@@ -107,8 +103,11 @@ def test_an_error_of_handling_that_is_half_there_is_told_with_what_it_lacks() ->
     ]  # fmt: skip
 
 
-def test_nothing_else_names_one() -> None:
+def test_every_file_takes_part_and_nothing_else_names_one() -> None:
     """Outside its package an error of handling is found, never imported or called by its id."""
+    assert sorted(type(one).__module__ for one in handling.alternatives()) == HANDLING
+    assert sorted(look.find.__module__ for look in faults.looks()) == FAULTS
+    assert sorted(SPOILT) == sorted(name.rpartition(".")[2] for name in FAULTS)
     ids = "|".join(one.id for one in handling.alternatives())
     text = re.compile(rf'data_errors\.(?:handling|faults)\.(?!fault\b)\w+|"(?:{ids})"')
     named = [
@@ -224,11 +223,6 @@ def lacks_as_fault(module: ModuleType) -> list[str]:
 @each(FAULTS)
 def test_a_data_fault_is_whole_in_its_file(name: str) -> None:
     assert lacks_as_fault(import_module(name)) == []
-
-
-def test_every_file_takes_part() -> None:
-    assert sorted(look.find.__module__ for look in faults.looks()) == FAULTS
-    assert sorted(SPOILT) == sorted(name.rpartition(".")[2] for name in FAULTS)
 
 
 def test_a_data_fault_that_is_half_there_is_told_with_what_it_lacks() -> None:

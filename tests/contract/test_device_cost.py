@@ -119,12 +119,6 @@ def chamber_reaches(profile: str, goal: float) -> float:
         return station.chamber.temperature()
 
 
-def test_every_family_has_an_adapter_a_simulation_and_a_profile():
-    kinds = {name: load_profile(name).kind for name in profile_names()}
-    of_profiles = {load_profile(name).adapter for name, kind in kinds.items() if kind not in {"reader", "slot"}}
-    assert set(adapters()) == set(family_names()) == of_profiles
-
-
 @each(OF_FAMILIES)
 def test_every_profile_has_its_adapter_its_simulated_device_and_its_entry_in_the_reference(name):
     profile = load_profile(name)
@@ -140,7 +134,10 @@ def test_every_profile_has_its_adapter_its_simulated_device_and_its_entry_in_the
     assert f"\n### {name}\n" in PAGE.read_text(encoding="utf-8"), "write it again: python -m docs.devices_page"
 
 
-def test_no_other_module_names_a_family():
+def test_every_family_has_an_adapter_a_simulation_and_a_profile_and_no_other_module_names_it():
+    kinds = {name: load_profile(name).kind for name in profile_names()}
+    of_profiles = {load_profile(name).adapter for name, kind in kinds.items() if kind not in {"reader", "slot"}}
+    assert set(adapters()) == set(family_names()) == of_profiles
     names = set(adapters()) - {"set_point"}  # also the name of a register
     places = [
         (path.relative_to(ROOT).as_posix(), name)
@@ -181,13 +178,10 @@ def test_a_new_family_is_two_modules_beside_its_profile(product):
     assert "| `acme` | chamber |" in page()
 
 
-def test_a_profile_of_an_unknown_family_is_refused_by_name(product):
+def test_an_unknown_family_and_one_without_its_simulation_or_its_adapter_are_named_with_what_is_missing(product):
     added(product, "watlow_f4z")
     with pytest.raises(RecipeInvalid, match=r"adapter watlow_f4z of kind chamber drives no chamber.*watlow_f4"):
         adapter_of(load_profile("acme"), "chamber", ThermalChamber)
-
-
-def test_a_family_without_its_simulation_or_its_adapter_is_named_with_the_file_that_is_missing(product):
     added(product, "acme", ENABLE, ADAPTER)
     assert set(adapters()) != set(family_names())  # what the contract above compares
     with pytest.raises(LookupError, match=r"stations/plant/families/acme\.py"):

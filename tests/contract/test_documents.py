@@ -44,16 +44,8 @@ CASES = {
     "station log --json": ["station", "log"],
     "import FILE --procedure sweep": ["import", "{folder}/sweep.csv", "--procedure", "sweep", "--units", "S1"],
     "import FILE… --procedure NAME --map reference=…": [
-        *(
-            "import",
-            "{folder}/step.csv",
-            "{folder}/step.csv",
-            "{folder}/step.csv",
-            "{folder}/step.csv",
-            "--units",
-            "S1",
-        ),
-        *("--procedure", "step_response", "--map", "z=out [V],reference=drive [V]", "--rate", "50000"),
+        "import", *["{folder}/step.csv"] * 4, "--units", "S1", "--procedure", "step_response",
+        "--map", "z=out [V],reference=drive [V]", "--rate", "50000",
     ],
     "run --json": ["fit", "latest", "--limits", "consumer"],
     "noise allan --json": ["noise", "allan", "{folder}/rest.csv", "--rate", "100"],
@@ -64,13 +56,7 @@ CASES = {
     "show RUN --report --json": ["show", "latest", "--report"],
     "extend --json": ["extend", "{folder}/model.toml", "second_order"],
     "release MODEL --json": [
-        "release",
-        "{folder}/model.toml",
-        "--since",
-        "2026-01-01",
-        "--force",
-        "--reason",
-        "a test",
+        "release", "{folder}/model.toml", "--since", "2026-01-01", "--force", "--reason", "a test",
     ],
     "release --json": ["release"],
     "certificate revoke UNIT --json": ["certificate", "revoke", "A1", "--reason", "a test"],
@@ -88,7 +74,7 @@ CASES = {
     "attributes add --json": ["attributes", "add", "{folder}/units.csv"],
     "attributes list --json": ["attributes", "list"],
     "archive backup --json": ["archive", "backup", "{folder}/copy"],
-}
+}  # fmt: skip
 WITHOUT_ARCHIVE = {"station frames", "plan", "inspect FILE", "plan keys [SUBJECT]", "extend", "archive key"}
 WITHOUT_ARCHIVE |= {f"station {one}" for one in ("status", "check", "profiles")}
 
@@ -173,10 +159,7 @@ def test_every_typed_document_is_printed_by_a_test_and_names_a_command() -> None
     assert set(BY_HEAD) - set(CASES) == set(ELSEWHERE)
     assert [path for path in ELSEWHERE.values() if not (ROOT / "tests" / path).is_file()] == []
     assert {head.split()[0] for head in BY_HEAD} <= set(COMMANDS)
-
-
-def test_every_command_that_prints_json_has_a_document() -> None:
-    """Those whose modules have the option ``--json`` themselves."""
+    # every command has one whose module has the option ``--json`` itself
     modules = Path(cli.__file__).parent.glob("*.py")
     printing = {path.stem.rstrip("_") for path in modules if "JsonOption" in path.read_text(encoding="utf-8")}
     of_a_format = {"export"}  # its --json is the format json: tests/contract/test_export_formats.py

@@ -62,51 +62,36 @@ def test_a_figure_is_in_the_table_with_its_unit_and_decision(name: str, kept, ta
     assert set(rows["outcome"]) == {"pass"}
 
 
-def test_the_table_has_the_figures_in_their_order(kept, table) -> None:
+def test_the_table_has_the_figures_in_their_order_their_code_is_in_its_key_and_limits_know_them(kept, table) -> None:
     first = table.loc[table["unit"] == table["unit"].iloc[0], "figure"]
     assert first.tolist() == yielded(kept)
     assert len(first) > 10
+    assert {kind.value.__module__ for kind in FIGURES.values()} <= set(sources(CODE["grade"]))
+    with pytest.raises(TypeError, match="known figures"):
+        Limits.model_validate(ALL)
+
+
+UNIT_OF_ENDING = {
+    "_ug": "µg", "_mg": "mg", "_mrad": "mrad", "_ug_K": "µg/K", "_ppm_K": "ppm/K", "_pct_FS": "%", "_rtHz": "µg/√Hz",
+}  # fmt: skip
 
 
 @each(FIGURES)
-def test_a_figure_says_what_a_recipe_lacks(name: str) -> None:
+def test_a_figure_is_named_in_parts_that_agree_and_says_what_a_recipe_lacks(name: str) -> None:
+    kind = FIGURES[name]
+    assert kind.label
+    assert kind.meaning.endswith(".")
+    assert kind.unit == next((unit for end, unit in UNIT_OF_ENDING.items() if name.endswith(end)), kind.unit)
     bare = SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True, sensor_axes=3)
-    missing = FIGURES[name].missing(bare)
-    whole = {
-        "static_record_s": 3600.0,
-        "verification": ["v1"],
-        "stability": object(),
-        "tumbles": True,
-        "sensor_axes": 3,
-    }
-    full = SimpleNamespace(**whole, effects=[missing.split()[1]] if missing else [])
-    assert FIGURES[name].missing(full) == ""
+    missing = kind.missing(bare)
+    own = {"effects": [missing.split()[1]] if missing else [], "stability": object(), "tumbles": True, "sensor_axes": 3}
+    full = SimpleNamespace(static_record_s=3600.0, verification=["v1"], **own)
+    assert kind.missing(full) == ""
     limits = limits_of({"name": "one", "figures": {name: {"max": 1.0, "unit": UNITS[name]}}}, UNITS)
     refuse_limits_without_figures(limits, full)
     if missing:
         with pytest.raises(RecipeInvalid, match=name):
             refuse_limits_without_figures(limits, bare)
-
-
-@each(FIGURES)
-def test_a_figure_is_named_in_parts_that_agree(name: str) -> None:
-    kind = FIGURES[name]
-    assert kind.label
-    assert kind.meaning.endswith(".")
-    ends = {
-        "_ug": "µg",
-        "_mg": "mg",
-        "_mrad": "mrad",
-        "_ug_K": "µg/K",
-        "_ppm_K": "ppm/K",
-        "_pct_FS": "%",
-        "_rtHz": "µg/√Hz",
-    }
-    assert kind.unit == next((unit for end, unit in ends.items() if name.endswith(end)), kind.unit)
-
-
-def test_every_figure_is_part_of_the_key_of_grade() -> None:
-    assert {kind.value.__module__ for kind in FIGURES.values()} <= set(sources(CODE["grade"]))
 
 
 def figures_in(folder: Path, monkeypatch: pytest.MonkeyPatch, **texts: str) -> dict[str, FigureKind]:
@@ -123,22 +108,17 @@ def test_one_file_is_a_figure_that_limits_may_name(tmp_path: Path, monkeypatch: 
         parse_limits(text, "limits own", UNITS)
 
 
+WHOLE = ONE.format(name="a_ug", order=1)
+
+
 @each(
     [
         ("no FIGURES, one is needed", {"one": "LABEL = 1\n"}),
-        ("2 figures have the name", {"one": ONE.format(name="a_ug", order=1), "two": ONE.format(name="a_ug", order=2)}),
-        (
-            "2 figures have the order",
-            {"one": ONE.format(name="a_ug", order=1), "two": ONE.format(name="b_ug", order=1)},
-        ),
+        ("2 figures have the name", {"one": WHOLE, "two": ONE.format(name="a_ug", order=2)}),
+        ("2 figures have the order", {"one": WHOLE, "two": ONE.format(name="b_ug", order=1)}),
     ]
 )
 def test_a_figure_that_is_half_there_is_refused(case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     message, texts = case
     with pytest.raises(IncompleteFigure, match=message):
         figures_in(tmp_path, monkeypatch, **texts)
-
-
-def test_limits_are_never_made_without_the_known_figures() -> None:
-    with pytest.raises(TypeError, match="known figures"):
-        Limits.model_validate(ALL)

@@ -34,26 +34,20 @@ def test_every_key_of_a_built_in_file_is_listed(name: str, sample: str) -> None:
     assert set(content) <= {key.name for key in keys_of(FILES[name]) if not key.table}
 
 
-def test_every_fault_is_listed_with_its_figures() -> None:
+def test_every_fault_is_listed_with_its_figures_and_every_hidden_effect_of_the_demo() -> None:
     rows = {row["fault"]: row for row in SUBJECTS["fault"][1]()}
     assert set(rows) == set(kinds())
     for name, kind in kinds().items():
         assert rows[name]["meaning"], name
         assert all(f"{figure}=" in rows[name]["keys"] for figure in kind.figures)
-
-
-def test_every_hidden_effect_of_the_demo_is_listed() -> None:
     assert {row["hidden effect"] for row in SUBJECTS["demo"][1]()} == {scene.kind for scene in SCENES}
 
 
 @each(["", *SUBJECTS])
-def test_the_command_prints_a_list_within_80_columns(subject: str) -> None:
+def test_the_command_prints_a_list_within_80_columns_and_refuses_an_unknown_one(subject: str) -> None:
     words = ("plan", "keys", *([subject] if subject else []))
     document = document_of(*words)
     assert document["subject"] == subject
     assert document["rows"]
     assert max(map(len, given(*words, columns=80)[1].splitlines())) <= 80
-
-
-def test_an_unknown_list_is_refused_with_the_known_ones() -> None:
-    assert "did you mean recipe" in refused("plan", "keys", "recipes")
+    assert f"did you mean {subject or 'recipe'}" in refused("plan", "keys", f"{subject or 'recipe'}s")

@@ -139,6 +139,10 @@ def test_the_lock_for_users_has_every_extra_that_is_not_for_development() -> Non
         for line in PROJECT["optional-dependencies"][extra]:
             taken |= parsed(line).extras if parsed(line).name == PROJECT["name"] else set()
     assert set(PROJECT["optional-dependencies"]) - taken == {"dev", "bench", "docs"}
+    # versions that are tested, accepted and locked agree
+    assert SpecifierSet(PROJECT["requires-python"]).contains(f"{PYTHONS[0]}.0")
+    assert not SpecifierSet(PROJECT["requires-python"]).contains("3.10.99")
+    assert set(re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["classifiers"]))) <= set(PYTHONS)
 
 
 def test_a_lock_of_one_python_alone_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,22 +151,12 @@ def test_a_lock_of_one_python_alone_is_found(monkeypatch: pytest.MonkeyPatch) ->
     wrong, _, _ = resolve("old", "3.13", made_from("run"))
     assert [re.sub(r" needs whenever.*the lock has None$", "", one) for one in wrong] == ["prefect"]
     assert resolve("old", "3.11", made_from("run"))[0] == []
-
-
-def test_extras_and_markers_of_a_lock_are_read() -> None:
     hashed = " \\\n    --hash=sha256:"
     first, second = pins(f"a.b[c, d]==1.0{hashed}{'1' * 64}\ne==2 ; python_version > '3.12'{hashed}{'2' * 64}")
     assert first == ("a-b", "1.0", None, ("1" * 64,))
     assert (second.name, second.version, second.hashes) == ("e", "2", ("2" * 64,))
     assert not second.holds(on_linux("3.11.2"))
     assert second.holds(on_linux("3.13"))
-
-
-def test_the_versions_that_are_tested_accepted_and_locked_agree() -> None:
-    assert SpecifierSet(PROJECT["requires-python"]).contains(f"{PYTHONS[0]}.0")
-    assert not SpecifierSet(PROJECT["requires-python"]).contains("3.10.99")
-    tested = re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["classifiers"]))
-    assert set(tested) <= set(PYTHONS)
 
 
 @each([(2, 7), (3, 10), (3, 15), *(tuple(map(int, p.split("."))) for p in PYTHONS)])

@@ -131,36 +131,27 @@ def test_a_procedure_that_is_half_there_is_refused(
     text = HALF.format(**PLAIN | REFUSED.get(refused, {}))
     if refused not in REFUSED:
         text = text.replace("PROCEDURE = One()", "")
+    for ability in (Evaluated, OnEquipment, SetsEquipment, FromWaveforms):
+        with pytest.raises(TypeError, match="abstract method"):
+            type("Bare", (ability,), {"steps": lambda *_: []})()
     name, path = made_package(tmp_path, monkeypatch, one=text, shared="FEWEST = 3\n")
     with pytest.raises(IncompleteProcedure, match=rf"{name}\.one: .*{refused}"):
         find_procedures(name, path)
 
 
-@each([Evaluated, OnEquipment, SetsEquipment, FromWaveforms])
-def test_every_ability_has_methods_without_which_a_procedure_cannot_be_made(ability) -> None:
-    bare = type("Bare", (ability,), {"steps": lambda *_: []})
-    with pytest.raises(TypeError, match="abstract method"):
-        bare()
-
-
 @each(PROCEDURES)
-def test_a_procedure_can_do_what_its_steps_ask_for(name: str, tmp_path: Path) -> None:
-    procedure = PROCEDURES[name]
+def test_a_procedure_is_documented_and_can_do_what_its_steps_ask_for(name: str, tmp_path: Path) -> None:
+    procedure, text = PROCEDURES[name], page()
+    assert all((procedure.states, procedure.source, procedure.title, type(procedure).__doc__, procedure.part.__doc__))
+    assert f"## {name}" in text
+    assert [effect for effect in EFFECTS if f"`{effect}`" not in text] == []
+    assert f"`{name}`" in HOW_TO.read_text(encoding="utf-8")
     own = load_steps(tmp_path, name) if name in PARTS else []
     orders = [step.order for step in own if step.order is not None and step.kind == "procedure"]
     assert bool(orders) == isinstance(procedure, Evaluated)
     assert {one.role for one in orders if one.role} <= set(procedure.roles)
     assert any(one.role and not one.on_table for one in orders) == isinstance(procedure, OnEquipment)
     assert any(one.on_table for one in orders) == isinstance(procedure, SetsEquipment)
-
-
-@each(PROCEDURES)
-def test_a_procedure_is_documented(name: str) -> None:
-    one = PROCEDURES[name]
-    assert all((one.states, one.source, one.title, type(one).__doc__, one.part.__doc__))
-    assert f"## {name}" in page()
-    assert [effect for effect in EFFECTS if f"`{effect}`" not in page()] == []
-    assert f"`{name}`" in HOW_TO.read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
@@ -176,6 +167,26 @@ def test_a_figure_of_a_procedure_may_have_a_limit_and_is_decided(name: str, run)
     for unit in rows.loc[~rows["identified"], "unit"]:
         reasons = run.table("grades").set_index("unit").loc[unit, "reasons"]
         assert f"{name}: not determined" in reasons
+
+
+@pytest.mark.slow
+def test_every_procedure_is_drawn_and_figures_agree_with_what_the_simulated_units_really_are(run) -> None:
+    points, page = run.table("procedure_points"), run.report.read_text(encoding="utf-8")
+    for name, part in zip(OWN, run.about["recipe"]["procedures"], strict=True):
+        drawn = picture(PROCEDURES[name], {**part}, points[(points["procedure"] == name) & (points["unit"] == "P2")])
+        assert "<svg" in drawn, name
+        assert len(re.findall(r"<(?:path|use|circle|rect|line|polyline|text)\b", drawn)) > 10, name
+        assert PROCEDURES[name].title in page
+    figures = run.table("procedure_figures")
+    plant = Plant(load_station(), lot())
+    for k, unit in enumerate(("P1", "P2")):
+        for name, true in truth_of(plant, k).items():
+            row = figures[(figures["unit"] == unit) & (figures["figure"] == name)].iloc[0]
+            if row["identified"]:
+                assert abs(row["value"] - true) < 4.5 * row["uncertainty"], (unit, true, row.to_dict())
+            elif np.isfinite(row["low"]):
+                assert row["low"] <= true <= row["high"], (unit, name)
+    assert figures["identified"].mean() > 0.8
 
 
 @each([name for name, one in PROCEDURES.items() if one.roles])
@@ -195,31 +206,6 @@ def test_a_capture_that_stops_goes_on_bit_for_bit(name: str, tmp_path: Path) -> 
         take(tmp_path, name, Stopping(broken, 2))
     take(tmp_path, name, broken)
     assert broken.hash() == whole.hash()
-
-
-@pytest.mark.slow
-@each(OWN)
-def test_a_procedure_is_drawn(name: str, run) -> None:
-    points = run.table("procedure_points")
-    own = points[(points["procedure"] == name) & (points["unit"] == "P2")]
-    drawn = picture(PROCEDURES[name], {**run.about["recipe"]["procedures"][OWN.index(name)]}, own)
-    assert "<svg" in drawn
-    assert len(re.findall(r"<(?:path|use|circle|rect|line|polyline|text)\b", drawn)) > 10
-    assert PROCEDURES[name].title in run.report.read_text(encoding="utf-8")
-
-
-@pytest.mark.slow
-def test_figures_agree_with_what_the_simulated_units_really_are(run) -> None:
-    figures = run.table("procedure_figures")
-    plant = Plant(load_station(), lot())
-    for k, unit in enumerate(("P1", "P2")):
-        for name, true in truth_of(plant, k).items():
-            row = figures[(figures["unit"] == unit) & (figures["figure"] == name)].iloc[0]
-            if row["identified"]:
-                assert abs(row["value"] - true) < 4.5 * row["uncertainty"], (unit, true, row.to_dict())
-            elif np.isfinite(row["low"]):
-                assert row["low"] <= true <= row["high"], (unit, name)
-    assert figures["identified"].mean() > 0.8
 
 
 def truth_of(plant: Plant, k: int) -> dict[str, float]:

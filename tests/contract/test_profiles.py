@@ -120,11 +120,8 @@ REFUSED = {
 def test_refuses_profiles_that_contradict_themselves(registers):
     with pytest.raises(RecipeInvalid, match=REFUSED[registers]):
         parse_as(Profile, PROFILE.replace("{registers}", registers), "p.toml")
-
-
-def test_unknown_profile_is_refused_with_what_looks_like_it():
     with pytest.raises(RecipeInvalid, match="watlow_f4t"):
-        load_profile("watlow_f4")
+        load_profile("watlow_f4")  # an unknown one: with what looks like it
 
 
 @each(preset_names())

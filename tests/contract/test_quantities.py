@@ -59,6 +59,9 @@ def test_every_station_reads_what_the_rows_say_and_dwells_keep_it():
     assert required == {row.column for row in RECORDED if row.reading}
     assert required <= set(KEPT)
     assert set(WHERE_THERE) == {row.column for row in RECORDED if row.joined == "max"}
+    recorded = {r.column for name in profile_names() for r in load_profile(name).registers if r.column}
+    assert recorded  # what a reader records besides has a row
+    assert recorded <= {row.column for row in RECORDED if not row.attribute}
 
 
 def test_a_plan_has_every_quantity_and_every_driver(tmp_path):
@@ -84,20 +87,10 @@ def test_steps_that_are_added_to_a_plan_go_on_with_every_quantity(tmp_path):
         if row.attribute and not row.once and getattr(state, row.attribute) is not None
         if getattr(longer, row.attribute).shape != (count,)
     ] == []
-
-
-def test_what_steps_leave_alone_has_a_remedy_that_varies_it(tmp_path):
-    state = planned_state(small_job(tmp_path).recipe)
-    for row in LEFT_ALONE:
+    for row in LEFT_ALONE:  # what steps leave alone has a remedy that varies it
         (remedy,) = (r for r in REMEDIES if r.driver == row.attribute)
         assert (remedy.feature(state), remedy.cure(state)) == (row.varied.feature, row.varied.cure)
         assert remedy.feature(remedy.apply(state)) == ""
-
-
-def test_what_a_reader_records_besides_has_a_row():
-    recorded = {r.column for name in profile_names() for r in load_profile(name).registers if r.column}
-    assert recorded
-    assert recorded <= {row.column for row in RECORDED if not row.attribute}
 
 
 def test_no_other_module_lists_the_columns():

@@ -229,12 +229,6 @@ def test_a_reader_says_what_it_is_and_is_in_the_guide(name: str) -> None:
     assert [other for other in READERS.values() if other.ORDER == reader.ORDER] == [reader]
 
 
-def test_text_is_tried_last_and_every_optional_format_is_in_the_extra_that_has_them_all() -> None:
-    assert list(READERS)[-1] == "text"
-    wanted = sorted({reader.EXTRA for reader in READERS.values() if reader.EXTRA})
-    assert EXTRAS["recordings"] == [f"tumbleline[{','.join(wanted)}]"]
-
-
 def sample(name: str, path: Path, request: pytest.FixtureRequest) -> str:
     """A file of a format at a path; the group of its channels."""
     if name in FROM_ELSEWHERE:
@@ -358,7 +352,10 @@ def test_a_reader_is_one_file_and_refused_with_all_that_is_missing_where_it_is_h
         find_readers(*made_package(tmp_path, monkeypatch, half=half, one=one, two=same))
 
 
-def test_no_other_file_names_a_reader() -> None:
+def test_no_other_file_names_a_reader_text_is_tried_last_and_one_extra_has_every_optional_format() -> None:
+    assert list(READERS)[-1] == "text"
+    wanted = sorted({reader.EXTRA for reader in READERS.values() if reader.EXTRA})
+    assert EXTRAS["recordings"] == [f"tumbleline[{','.join(wanted)}]"]
     folder = Path(readers.__file__).parent
     names = [f"{readers.__name__}.{one.__name__.rpartition('.')[2]} import" for one in READERS.values()]
     texts = {

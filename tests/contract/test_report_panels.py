@@ -37,23 +37,12 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> ReportContext:
 
 
 @each(FOUND, lambda module: module.__name__)
-def test_a_panel_explains_itself_and_is_in_the_guide(one) -> None:
+def test_a_panel_explains_itself_is_in_the_guide_and_is_whole_html(one, report: ReportContext) -> None:
     assert one.__doc__
     assert one.render.__doc__
     assert not one.TITLE or f"**{one.TITLE}.**" in GUIDE
-
-
-@each(panels(PANELS), lambda module: module.__name__)
-def test_a_panel_of_the_run_is_whole_html(one, report: ReportContext) -> None:
-    html = one.render(report)
-    assert html or one.__name__ in NOT_OF_OLD_RUNS
-    assert closed(html or "")
-
-
-@each(panels(UNIT_PANELS), lambda module: module.__name__)
-def test_a_panel_of_a_unit_is_whole_html(one, report: ReportContext) -> None:
-    for unit in report.calibrated:
-        html = one.render(unit)
+    for subject in [report] if one in panels(PANELS) else report.calibrated:
+        html = one.render(subject)
         assert html or one.__name__ in NOT_OF_OLD_RUNS
         assert closed(html or "")
 
@@ -79,11 +68,9 @@ def test_one_file_is_a_panel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, re
     both = (*panels(package), *panels(PANELS))
     monkeypatch.setattr(panel, "panels", lambda name: both if name == PANELS else panels(name))
     assert "<h2>Own</h2>\n<p>2 units</p>" in render(report.run)
-
-
-def test_a_panel_with_nothing_to_show_has_no_heading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    empty = ONE.format(order=5).replace('f"<p>{len(report.units)} units</p>"', "None")
-    assert rendered(made_package(tmp_path, monkeypatch, own=empty)[0], None) == []
+    (tmp_path / "empty").mkdir()
+    nothing = ONE.format(order=5).replace('f"<p>{len(report.units)} units</p>"', "None")
+    assert rendered(made_package(tmp_path / "empty", monkeypatch, own=nothing)[0], None) == []  # and no heading
 
 
 WHOLE = ONE.format(order=5)

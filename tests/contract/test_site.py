@@ -23,26 +23,18 @@ def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_every_page_of_the_documents_is_in_the_navigation(staged: Path) -> None:
+def test_every_page_and_module_is_in_the_site_which_loads_nothing_of_others_and_checks_its_links(staged: Path) -> None:
     listed = re.findall(r"'([^']+\.md)'", str(navigation(staged)))
     assert len(listed) == len(set(listed))
     pages = [str(path.relative_to(ROOT)) for path in (*ROOT.glob("docs/**/*.md"), *ROOT.glob("deploy/*.md"))]
     assert set(pages) <= set(listed)
     assert [name for name in listed if not (staged / name).is_file()] == []
-
-
-def test_every_module_of_the_science_and_of_the_package_for_python_has_a_page(staged: Path) -> None:
-    pages = {path.stem for path in (staged / "docs" / "reference" / "inertial").glob("inertial*.md")}
-    assert pages == set(modules("inertial"))
-    assert {path.stem for path in (staged / "docs" / "reference" / "tumbleline").glob("t*.md")} == set(
-        modules("tumbleline")
-    )
-    assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.spectra"} <= pages
-
-
-def test_the_site_loads_no_fonts_of_others_and_checks_its_links() -> None:
+    for package in ("inertial", "tumbleline"):  # every module of the science and of the package for Python has one
+        own = {path.stem for path in (staged / "docs" / "reference" / package).glob(f"{package}*.md")}
+        assert own == set(modules(package))
+    assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.spectra"} <= set(modules("inertial"))
     content = yaml.safe_load(CONFIGURATION.read_text(encoding="utf-8"))
-    assert content["theme"]["font"] is False
+    assert content["theme"]["font"] is False  # the site loads no fonts of others and checks its links
     assert {"search", "offline"} <= {name for name in content["plugins"] if isinstance(name, str)}
     assert set(content["validation"]["links"].values()) == {"warn"}  # an error with --strict
 
@@ -59,10 +51,8 @@ def test_the_site_is_built_is_searched_without_a_server_and_loads_nothing_from_e
     words = " ".join(entry["text"] for entry in index["docs"])
     assert "specific force" in words
     assert results_of("hysteresis", tmp_path / "index.html") >= 5
-    effect = (tmp_path / "docs" / "reference" / "inertial" / "inertial.effects.third_order.html").read_text(
-        encoding="utf-8"
-    )
-    assert "doc-heading" in effect
+    effect = tmp_path / "docs" / "reference" / "inertial" / "inertial.effects.third_order.html"
+    assert "doc-heading" in effect.read_text(encoding="utf-8")
 
 
 def results_of(word: str, page: Path) -> int:

@@ -65,20 +65,22 @@ def own_environment(**more: str) -> dict[str, str]:
     return {**kept, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **more}
 
 
-def test_the_wheel_holds_every_tracked_file_of_the_packages(unpacked: Path) -> None:
+def test_the_wheel_holds_every_tracked_file_samples_and_lock_and_says_what_was_tested(unpacked: Path) -> None:
     needed = {str(path.relative_to(ROOT)) for path in tracked(*SHIPPED)}
     files = [path for top in SHIPPED for path in (unpacked / top).rglob("*") if path.is_file()]
     held = {str(path.relative_to(unpacked)) for path in files}
     assert needed - held == set()
     assert {name for name in held if not name.endswith(".pyc")} - needed == set()
-
-
-def test_the_wheel_holds_the_samples_of_the_deployment_and_the_lock(unpacked: Path) -> None:
-    (share,) = unpacked.glob(f"*.data/data/{SHARE}")
-    needed = {str(path.relative_to(ROOT)): path.read_bytes() for path in tracked(*SAMPLES)}
-    assert len(needed) > 15
-    held = {str(path.relative_to(share)): path.read_bytes() for path in share.rglob("*") if path.is_file()}
-    assert {name for name, content in needed.items() if held.get(name) != content} == set()
+    (share,) = unpacked.glob(f"*.data/data/{SHARE}")  # the samples of the deployment and the lock
+    samples = {str(path.relative_to(ROOT)): path.read_bytes() for path in tracked(*SAMPLES)}
+    assert len(samples) > 15
+    shared = {str(path.relative_to(share)): path.read_bytes() for path in share.rglob("*") if path.is_file()}
+    assert {name for name, content in samples.items() if shared.get(name) != content} == set()
+    (path,) = unpacked.glob("*.dist-info/METADATA")
+    text = path.read_text(encoding="utf-8")
+    versions = [line for line in text.splitlines() if "Programming Language :: Python :: 3." in line]
+    assert versions == [f"Classifier: Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)]
+    assert "\nLicense-Expression: Apache-2.0\n" in text
 
 
 def test_the_source_distribution_holds_what_the_wheel_was_built_from(built: tuple[Path, Path]) -> None:
@@ -108,14 +110,6 @@ def test_every_file_that_is_used_by_name_is_read_from_the_wheel(unpacked: Path, 
     assert "doctor" in loaded["commands"]
 
 
-def test_metadata_say_what_was_tested(unpacked: Path) -> None:
-    (path,) = unpacked.glob("*.dist-info/METADATA")
-    text = path.read_text(encoding="utf-8")
-    versions = [line for line in text.splitlines() if "Programming Language :: Python :: 3." in line]
-    assert versions == [f"Classifier: Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)]
-    assert "\nLicense-Expression: Apache-2.0\n" in text
-
-
 @pytest.mark.slow
 def test_the_product_runs_from_the_wheel_in_an_empty_folder(built: tuple[Path, Path], tmp_path: Path) -> None:
     """The libraries are those of this environment, by path: its own installation of the product is not reached that way."""
@@ -123,19 +117,8 @@ def test_the_product_runs_from_the_wheel_in_an_empty_folder(built: tuple[Path, P
     empty.mkdir()
     venv.create(home, with_pip=False, symlinks=True)
     python = home / "bin" / "python"
-    pip = [
-        sys.executable,
-        "-m",
-        "pip",
-        "--python",
-        str(python),
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--no-index",
-        built[0],
-    ]
-    subprocess.run(pip, check=True, env=own_environment(PIP_DISABLE_PIP_VERSION_CHECK="1"))
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "--no-deps", "--no-index"]
+    subprocess.run([*pip, built[0]], check=True, env=own_environment(PIP_DISABLE_PIP_VERSION_CHECK="1"))
     (site,) = home.glob("lib/python*/site-packages")
     libraries = next(p for p in sys.path if p.endswith("site-packages"))
     (site / "libraries.pth").write_text(libraries + "\n", encoding="utf-8")

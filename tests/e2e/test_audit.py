@@ -18,6 +18,7 @@ from s3_server import CREDENTIALS, s3_bucket
 
 from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive
+from pipelines.audit import index
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import date_of, day_of
 from pipelines.audit.document import document
@@ -27,7 +28,7 @@ from pipelines.audit.rules import load_rules
 from pipelines.audit.sql import ask
 from pipelines.flows.local import local_server
 from pipelines.tables.json_values import json_value
-from schemas.errors import RecipeInvalid, WrongUse
+from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
 
 UNTIL = "2022-01-31"
 NAMESPACES = ("www.w3.org", "purl.org", "creativecommons.org")
@@ -89,9 +90,14 @@ def test_only_changed_runs_are_read_again_and_a_changed_byte_leaves_out_its_run(
     assert again.table("runs").num_rows == 23
 
 
-def test_an_archive_that_cannot_be_written_is_audited_too(made, tmp_path, monkeypatch):
-    from pipelines.audit import index
-    from schemas.errors import ArchiveUnusable
+def test_a_re_run_of_a_capture_is_no_second_calibration_and_what_cannot_be_written_is_audited(made, copy, monkeypatch):
+    run = min((copy / "runs").iterdir())
+    again = copy / "runs" / f"{run.name}x"
+    shutil.copytree(run, again)
+    about = json.loads((again / "run.json").read_text())
+    about |= {"rerun_of": run.name, "measured": about["when"], "when": "2026-01-01T00:00:00+00:00"}
+    (again / "run.json").write_text(json.dumps(about))
+    assert told(Archive(copy)) == told(Archive(made))
 
     def refuse(*_args: object, **_more: object):
         raise ArchiveUnusable("archive: read-only")
@@ -101,20 +107,18 @@ def test_an_archive_that_cannot_be_written_is_audited_too(made, tmp_path, monkey
     assert index.up_to_date(Archive(made)).table("runs").num_rows == 24
 
 
-def test_a_re_run_of_a_capture_is_not_a_second_calibration(made, copy):
-    run = min((copy / "runs").iterdir())
-    again = copy / "runs" / f"{run.name}x"
-    shutil.copytree(run, again)
-    about = json.loads((again / "run.json").read_text())
-    about |= {"rerun_of": run.name, "measured": about["when"], "when": "2026-01-01T00:00:00+00:00"}
-    (again / "run.json").write_text(json.dumps(about))
-    assert told(Archive(copy)) == told(Archive(made))
+READS = (
+    "EXPLAIN SELECT * FROM dwells", "EXPLAIN ANALYZE SELECT count(*) FROM dwells", "explain (format json) FROM units",
+    "-- how many\nEXPLAIN /* so */ ANALYZE WITH q AS (SELECT 1) SELECT * FROM q", "DESCRIBE units",
+    "SUMMARIZE units", "FROM units", "TABLE units", "VALUES (1)", "/* first */ SELECT 1 -- last",
+)  # fmt: skip
 
 
-def test_questions_in_sql_see_the_same_from_index_and_files(made):
+def test_every_way_to_read_is_answered_and_sees_the_same_from_index_and_files(made):
     question = "SELECT run, unit, axis, effect, name, value FROM coefficients ORDER BY ALL"
     archive = Archive(made)
     assert ask(archive, question).rows == ask(archive, question, compact=False).rows
+    assert [read for read in READS if not ask(archive, read).rows] == []
     counted = ask(archive, "SELECT count(*), count(DISTINCT run) FROM dwells").rows[0]
     assert counted == (sum(len(archive.run(info.id).table("dwells")) for info in archive.runs()), 24)
 
@@ -173,25 +177,9 @@ def test_no_question_writes_or_reads_a_file_of_its_own_choice(made):
     assert content(made) == before
 
 
-@each(
-    [
-        "EXPLAIN SELECT * FROM dwells", "EXPLAIN ANALYZE SELECT count(*) FROM dwells", "explain (format json) FROM units",
-        "-- how many\nEXPLAIN /* so */ ANALYZE WITH q AS (SELECT 1) SELECT * FROM q", "DESCRIBE units",
-        "SUMMARIZE units", "FROM units", "TABLE units", "VALUES (1)", "/* first */ SELECT 1 -- last",
-    ],
-)  # fmt: skip
-def test_every_way_to_read_is_answered(question, made):
-    assert ask(Archive(made), question).rows
-
-
 def test_the_query_command_prints_a_table_json_and_csv(made):
-    words = (
-        "archive",
-        "query",
-        "SELECT station, count(*) AS n FROM runs GROUP BY station ORDER BY station",
-        "--archive",
-        made,
-    )
+    question = "SELECT station, count(*) AS n FROM runs GROUP BY station ORDER BY station"
+    words = ("archive", "query", question, "--archive", made)
     assert document_of(*words, status=0)["rows"][0] == {"station": "line-1", "n": 6}
     assert given(*words, "--output", "-")[1].splitlines()[:2] == ["station,n", "line-1,6"]
     assert "line-1" in text_of(*words)

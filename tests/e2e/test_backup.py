@@ -161,17 +161,21 @@ def rows_of(path: Path) -> int:
         return int(opened.execute("select count(*) from flow_run").fetchone()[0])
 
 
-def test_the_database_of_a_server_is_copied_while_it_is_open_and_restored(tmp_path: Path) -> None:
-    live = tmp_path / "prefect.db"
+def test_the_database_of_a_server_is_copied_while_it_is_open_and_restored_when_it_is_not(tmp_path: Path) -> None:
+    live, copy = tmp_path / "prefect.db", tmp_path / "copies" / "one.db"
     database(live, 100)
     with closing(sqlite3.connect(live)) as server:  # holds the log open, and writes on
         server.execute("insert into flow_run values (1)")
         server.commit()
-        copy_database(str(live), tmp_path / "copies" / "one.db")
-    assert rows_of(tmp_path / "copies" / "one.db") == 101
-    assert stat.S_IMODE((tmp_path / "copies" / "one.db").stat().st_mode) == 0o600
-    database(live, 5)
-    restore_database(tmp_path / "copies" / "one.db", str(live))
+        copy_database(str(live), copy)
+        server.execute("insert into flow_run values (7)")
+        server.commit()
+        with pytest.raises(WrongUse, match="is in use"):
+            restore_database(copy, str(live))
+        assert server.execute("select count(*) from flow_run").fetchone()[0] == 102
+    assert rows_of(copy) == 101
+    assert stat.S_IMODE(copy.stat().st_mode) == 0o600
+    restore_database(copy, str(live))
     assert rows_of(live) == 101
     assert stat.S_IMODE(live.stat().st_mode) == 0o600
 
@@ -188,17 +192,13 @@ def test_a_damaged_copy_of_a_database_is_refused_and_the_database_kept(tmp_path:
         copy_database(str(live), torn)
 
 
-@pytest.fixture
-def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The database of the server of this line."""
+def test_the_command_keeps_the_newest_copies_of_the_database_and_a_refused_restore_leaves_it(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PREFECT_HOME", str(tmp_path))
     monkeypatch.delenv("PREFECT_SERVER_DATABASE_CONNECTION_URL", raising=False)
-    database(tmp_path / "prefect.db", 3)
-    return tmp_path / "prefect.db"
-
-
-def test_the_command_keeps_the_newest_copies_of_the_database(made: Path, tmp_path: Path, server: Path) -> None:
-    copies = tmp_path / "copies"
+    server, copies = tmp_path / "prefect.db", tmp_path / "copies"
+    database(server, 3)
     copies.mkdir()
     for day in range(1, 6):
         (copies / f"orchestrator-2026010{day}T000000.db").touch()
@@ -207,9 +207,6 @@ def test_the_command_keeps_the_newest_copies_of_the_database(made: Path, tmp_pat
     kept = sorted(path.name for path in copies.iterdir())
     assert kept[0] == "orchestrator-20260105T000000.db"
     assert rows_of(copies / kept[1]) == rows_of(server)
-
-
-def test_a_refused_restore_of_the_archive_leaves_the_database(made: Path, tmp_path: Path, server: Path) -> None:
     database(tmp_path / "old.db", 1)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "file").touch()
@@ -250,20 +247,6 @@ def test_a_damaged_file_does_not_replace_the_sound_one_of_the_copy_nor_stay_in_i
         there.write_bytes(wrong)
         assert copy_archive(archive, copy).files == 1
         assert there.read_bytes() == sound
-
-
-def test_a_database_that_a_server_has_open_is_not_replaced(tmp_path: Path) -> None:
-    live, copy = tmp_path / "prefect.db", tmp_path / "one.db"
-    database(live, 5)
-    copy_database(str(live), copy)
-    with closing(sqlite3.connect(live)) as server:
-        server.execute("insert into flow_run values (7)")
-        server.commit()
-        with pytest.raises(WrongUse, match="is in use"):
-            restore_database(copy, str(live))
-        assert server.execute("select count(*) from flow_run").fetchone()[0] == 6
-    restore_database(copy, str(live))
-    assert rows_of(live) == 5
 
 
 def test_the_seal_of_an_entry_that_is_written_while_the_files_are_listed_is_copied(line, tmp_path: Path) -> None:

@@ -46,9 +46,7 @@ def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path) -
     assert [line.split()[0] for line in told.splitlines() if line][:3] == ["capture", "validate", "reduce"]
     printed = text_of("show", "--archive", archive)
     assert all(unit in printed for unit in ("A1", "A2", "A3", "report"))
-
-
-def test_every_statistic_of_the_static_record_of_a_run_is_made_from_its_samples(archive: Path) -> None:
+    # every statistic of the static record is made from its samples
     words = ("noise", "allan", "latest", "--archive", archive)
     usual, total = document_of(*words), document_of(*words, "--statistic", "total")
     assert (total["statistic"], total["deviation_unit"], usual["deviation_unit"]) == ("total", "µg", "µg")

@@ -26,6 +26,7 @@ from pipelines.tables.calibration import read_calibration
 
 RATE, GRAVITY_G = 100.0, 9.8123 / 9.80665
 FORCES = [f"force_{axis}_g" for axis in "xyz"]
+BIAS = np.array([1.5e-3, -2e-3, 0.8e-3])
 
 
 @pytest.fixture(scope="module")
@@ -122,15 +123,11 @@ def test_the_arithmetic_is_that_of_the_exported_c(run: Run, home: Path, rng: np.
 def test_the_bias_is_found_where_the_force_is_known_and_its_uncertainty_grows_after(
     run: Run, home: Path, rng: np.random.Generator
 ) -> None:
-    n, bias, force = 12_000, np.array([1.5e-3, -2e-3, 0.8e-3]), [0.0, 0.6, 0.8]
-    table = still(run, rng, n, warm=30.0, force=force, bias=bias)
-    table[["force_x", "force_y", "force_z"]] = force
-    table.loc[6000:, ["force_x", "force_y", "force_z"]] = np.nan
-    document, done = corrected(run, table, "--set", "turn_on=2000")
+    document, done = corrected(run, tracked(run, rng), "--set", "turn_on=2000")
     own = document["bias"]
     error, u = (np.array([own[name][axis] for axis in "xyz"]) for name in ("last_ug", "u_last_ug"))
     # 30 µg: what the fit itself is wrong by in this pose is found as bias
-    assert np.all(np.abs(error - 1e6 * bias) < 4.0 * np.hypot(u, 30.0))
+    assert np.all(np.abs(error - 1e6 * BIAS) < 4.0 * np.hypot(u, 30.0))
     assert (own["updates"], own["steps"]) == (60, 120)
     grown = done["u_bias_x_ug"].to_numpy()
     assert np.all(np.diff(grown[6100:]) >= -1e-9)
@@ -138,13 +135,18 @@ def test_the_bias_is_found_where_the_force_is_known_and_its_uncertainty_grows_af
     assert grown[0] > 1900.0
 
 
-def test_at_rest_the_bias_along_gravity_alone_is_found(run: Run, home: Path, rng: np.random.Generator) -> None:
+def test_at_rest_the_bias_along_gravity_alone_is_found_and_a_wrong_force_told(
+    run: Run, home: Path, rng: np.random.Generator
+) -> None:
     table = still(run, rng, 6000, force=[0.0, 0.0, GRAVITY_G], bias=np.array([0.0, 0.0, 3e-3]))
     document, _ = corrected(run, table, "--set", "turn_on=3000", "--track", "at-rest")
     own = document["bias"]
     assert own["last_ug"]["z"] == pytest.approx(3000.0, abs=150.0)
     assert own["u_last_ug"]["x"] > 2900.0
     assert own["u_last_ug"]["z"] < 300.0
+    wander = np.cumsum(2e-5 * rng.normal(size=(6000, 3)), axis=0)  # far more than the unit's noise
+    document, _ = corrected(run, still(run, rng, 6000, bias=wander), *UP, status=1)
+    assert document["bias"]["stated_uncertainty"] == "too small"
 
 
 UP = ("--set", "turn_on=300", "--track", "0,0,1")
@@ -185,7 +187,7 @@ FILTERED_C = """
 def tracked(run: Run, rng: np.random.Generator) -> pd.DataFrame:
     """Two minutes in one pose with another bias; the force is known in the first."""
     force = [0.0, 0.6, 0.8]
-    table = still(run, rng, 12_000, warm=30.0, force=force, bias=np.array([1.5e-3, -2e-3, 0.8e-3]))
+    table = still(run, rng, 12_000, warm=30.0, force=force, bias=BIAS)
     table[["force_x", "force_y", "force_z"]] = force
     table.loc[6000:, ["force_x", "force_y", "force_z"]] = np.nan
     return table
@@ -213,30 +215,11 @@ def test_the_filters_are_those_of_scipy_and_of_the_exported_c_with_the_bias(
         fall = done[FORCES].to_numpy()[after].var(axis=0) / force[after].var(axis=0)
         assert fall.mean() == pytest.approx(2.0 * one["noise_bandwidth_hz"] / RATE, rel=0.3)
         assert done["u_x_ug"].iloc[-1] < plain["u_x_ug"].iloc[-1]
-        words = (
-            "--format",
-            "c",
-            "--include",
-            "failed",
-            "--units",
-            "A1",
-            "--filter",
-            f"{kind}:9",
-            "--rate",
-            "100",
-            "--set",
-            "track=yes",
-            *own,
-        )
-        header = text_of_export(run, "--format", "c", *words)
+        words = f"--format c --include failed --units A1 --filter {kind}:9 --rate 100 --set track=yes".split()
+        assert given("export", run.id, "--archive", run.archive.root, *words, *own, "--output", "out.h")[0] == 0
+        header = Path("out.h").read_text(encoding="utf-8")
         rows = table[["x", "y", "z", "unit_C"]].to_numpy()
         assert np.max(np.abs(compiled(header, FILTERED_C, rows, home, "A1") - done[FORCES].to_numpy())) < 1e-10
-
-
-def text_of_export(run: Run, *words: str) -> str:
-    """What an export writes."""
-    assert given("export", run.id, "--archive", run.archive.root, *words, "--output", "out.h")[0] == 0
-    return Path("out.h").read_text(encoding="utf-8")
 
 
 def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path, rng: np.random.Generator) -> None:
@@ -305,12 +288,6 @@ def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path,
     assert "at most 40 Hz" in refused(*own, "--bandwidth", "70", "--output", "raw.csv")
 
 
-def test_a_wrong_force_is_told_by_the_innovations(run: Run, home: Path, rng: np.random.Generator) -> None:
-    wander = np.cumsum(2e-5 * rng.normal(size=(6000, 3)), axis=0)  # far more than the unit's noise
-    document, _ = corrected(run, still(run, rng, 6000, bias=wander), *UP, status=1)
-    assert document["bias"]["stated_uncertainty"] == "too small"
-
-
 def test_it_is_said_where_the_force_comes_from_and_what_is_stated_counts(
     run: Run, home: Path, rng: np.random.Generator
 ) -> None:
@@ -333,7 +310,7 @@ def test_it_is_said_where_the_force_comes_from_and_what_is_stated_counts(
     assert "--track none and at-rest, one of them is needed" in refused(*command, *both)
 
 
-def test_a_gap_in_the_recording_changes_neither_steps_nor_uncertainty(
+def test_a_gap_changes_neither_steps_nor_uncertainty_and_samples_after_the_last_step_have_that_of_their_time(
     run: Run, home: Path, rng: np.random.Generator
 ) -> None:
     n = 6000
@@ -343,14 +320,9 @@ def test_a_gap_in_the_recording_changes_neither_steps_nor_uncertainty(
     assert one["bias"]["steps"] == other["bias"]["steps"] == 60
     np.testing.assert_allclose(gap["u_x_ug"][: n // 2], whole["u_x_ug"][: n // 2], rtol=1e-6)
     assert gap["u_x_ug"][n // 2] > whole["u_x_ug"][n // 2]  # the bias has drifted meanwhile
-
-
-def test_samples_after_the_last_whole_step_have_the_uncertainty_of_their_time(
-    run: Run, home: Path, rng: np.random.Generator
-) -> None:
-    n, tail = 6050, 50  # half a step, an hour later
-    table = still(run, rng, n)
-    table["time_s"] += 3600.0 * (np.arange(n) >= n - tail)
+    tail = 50  # half a step, an hour later
+    table = still(run, rng, n + tail)
+    table["time_s"] += 3600.0 * (np.arange(n + tail) >= n)
     document, done = corrected(run, table, *UP)
     own = done["u_bias_x_ug"].to_numpy()
     assert np.all(own[-tail:] > 1.5 * own[-tail - 1])

@@ -99,6 +99,7 @@ def test_diagnose_names_what_is_missing_in_text_document_and_report(cubic: Path,
     assert "content=\"default-src 'none'; script-src 'sha256-" in text  # its two scripts by their hashes, and no other
     assert not re.search(r'<script[^>]*\bsrc=|(src|href)="(https?:)?//', outside)
     assert text_of("diagnose", *lot, "--effects", f"{PLAIN},third_order", status=0).startswith("ADEQUATE")
+    assert "adc_nonlinearity" in text_of("compare", lot[0], "--effects", f"{PLAIN},adc_nonlinearity", status=0)
 
 
 def test_a_lot_of_faulty_units_is_blocked(cubic: Path, tmp_path: Path) -> None:
@@ -139,11 +140,8 @@ def test_unusable_input_is_one_message(
     message = refused("diagnose", "d.parquet", *words.split())
     assert [part for part in UNUSABLE[words].split("; ") if part not in message] == [], message
     assert not Path("next.toml").exists()
-
-
-def test_a_missing_column_is_named(cubic: Path, tmp_path: Path) -> None:
-    pd.read_parquet(cubic / "dwells.parquet").rename(columns={"out_x": "outx"}).to_csv(tmp_path / "d.csv", index=False)
-    assert "column out_x is missing; out_x: did you mean outx" in refused("diagnose", tmp_path / "d.csv")
+    pd.read_parquet("d.parquet").rename(columns={"out_x": "outx"}).to_csv("d.csv", index=False)
+    assert "column out_x is missing; out_x: did you mean outx" in refused("diagnose", "d.csv")
 
 
 @pytest.mark.usefixtures("no_next_measurement")
@@ -227,16 +225,7 @@ def test_the_course_of_a_day_is_offered_with_its_period_and_makes_the_model_adeq
 
 
 @pytest.mark.usefixtures("no_next_measurement")
-def test_an_effect_file_takes_part(humid: Path, tmp_path: Path) -> None:
-    (tmp_path / "damp.py").write_text(OWN, encoding="utf-8")
-    words = ("diagnose", humid / "dwells.parquet", "--effect-file", tmp_path / "damp.py")
-    document = document_of(*words, status=1)
-    assert "damp" in {name for group in document["classes"] for name in group["effects"]}
-    assert "damp" in document["recommended"]
-
-
-@pytest.mark.usefixtures("no_next_measurement")
-def test_the_lines_after_it_carry_effect_file_and_dwells_left_out_and_run(
+def test_an_effect_file_takes_part_and_the_lines_after_it_carry_it_and_dwells_left_out_and_run(
     humid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -246,6 +235,10 @@ def test_the_lines_after_it_carry_effect_file_and_dwells_left_out_and_run(
     words = ("diagnose", humid / "dwells.parquet", "--effect-file", "my damp.py", "--leave-out", left)
     with effects.additions_forgotten():
         _, out, _ = given(*words)
+    with effects.additions_forgotten():
+        document = document_of(*words, status=1)
+    assert "damp" in {name for group in document["classes"] for name in group["effects"]}
+    assert "damp" in document["recommended"]
     lines = printed_commands(out.split("Next:", 1)[1])
     assert [one[0] for one in lines] == [*["extend"] * (len(lines) - 1), "history"]
     assert all(one[one.index("--effect-file") + 1] == "my damp.py" for one in lines)
@@ -356,8 +349,3 @@ def test_steps_at_the_same_temperature_join_the_soak_and_others_begin_one() -> N
     assert len(recipe.poses) == 7
     with pytest.raises(RecipeInvalid):
         next_recipe(base, [{**STEP, "chamber_C": 1e6}], "next")
-
-
-def test_a_page_of_compare_names_the_parameter_of_an_effect(cubic: Path) -> None:
-    status, out, _ = given("compare", cubic / "dwells.parquet", "--effects", f"{PLAIN},adc_nonlinearity")
-    assert (status, "adc_nonlinearity" in out) == (0, True)

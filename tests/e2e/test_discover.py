@@ -11,6 +11,7 @@ from each import each
 from in_process import document_of, given, refused, text_of
 from typed_commands import printed_commands
 
+import tumbleline
 from inertial.frames import force_from_angles
 from pipelines.archive import Archive
 from pipelines.demo.archive_lots import Hidden, Line, write_lots
@@ -74,13 +75,22 @@ def test_an_effect_of_a_model_file_takes_its_discovery_away(folder: Path, tmp_pa
     assert len(list(nights.iterdir())) == 1  # what is in memory only is not kept
 
 
-def test_the_same_archive_is_verified_and_its_attributes_are_listed(folder: Path) -> None:
-    listed = document_of("attributes", "list", "--archive", folder / "archive")
-    (wafer,) = listed["attributes"]
+def test_the_archive_is_verified_its_evidence_is_in_order_of_arrival_and_python_and_audit_tell_the_same(
+    folder: Path,
+) -> None:
+    archive = Archive(str(folder / "archive"))
+    (wafer,) = document_of("attributes", "list", "--archive", archive.root)["attributes"]
     assert (wafer["attribute"], wafer["known"], wafer["levels"]) == ("wafer", 352, 4)
-    status, out, err = given("verify", "--archive", folder / "archive")
+    status, out, err = given("verify", "--archive", archive.root)
     assert status in {0, 1}, err
     assert "discovery" not in out
+    nights = folder / "archive" / "discovery" / "DEMO" / "nights"
+    (entry,) = [json.loads(place.read_bytes()) for place in nights.iterdir()]
+    assert entry["runs"] == DiscoveryArchive(archive).pooled()
+    assert entry["alarms"]
+    (row,) = tumbleline.archive(folder / "archive").discoveries().to_dict("records")
+    assert (row["id"], row["driver"]) == ("D1", "wafer")
+    assert discovered_before(archive) == [("DEMO", 1)]
 
 
 REFUSED = {
@@ -104,10 +114,9 @@ def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
     assert "holds no archive" in refused("discover", "--archive", tmp_path / "nothing")
     assert "there is no file" in refused("attributes", "add", tmp_path / "u.csv", "--archive", tmp_path / "archive")
     (tmp_path / "u.csv").write_text("wafer\nW1\n", encoding="utf-8")
-    assert "no column 'serial'" in refused("attributes", "add", tmp_path / "u.csv", "--archive", tmp_path / "archive")
-    assert "--by is 'lot'" in refused(
-        "attributes", "add", tmp_path / "u.csv", "--by", "lot", "--archive", tmp_path / "archive"
-    )
+    add = ("attributes", "add", tmp_path / "u.csv", "--archive", tmp_path / "archive")
+    assert "no column 'serial'" in refused(*add)
+    assert "--by is 'lot'" in refused(*add, "--by", "lot")
 
 
 def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: Path) -> None:
@@ -122,23 +131,8 @@ def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: 
     assert "has files already" in refused("demo", "--lots", "400", "--folder", folder)
 
 
-def test_the_evidence_is_in_order_of_arrival(folder: Path) -> None:
-    nights = folder / "archive" / "discovery" / "DEMO" / "nights"
-    (entry,) = [json.loads(place.read_bytes()) for place in nights.iterdir()]
-    assert entry["runs"] == DiscoveryArchive(Archive(str(folder / "archive"))).pooled()
-    assert entry["alarms"]
-
-
-def test_python_and_the_audit_tell_the_same(folder: Path) -> None:
-    import tumbleline
-
-    (row,) = tumbleline.archive(folder / "archive").discoveries().to_dict("records")
-    assert (row["id"], row["driver"]) == ("D1", "wafer")
-    assert discovered_before(Archive(str(folder / "archive"))) == [("DEMO", 1)]
-
-
 @pytest.mark.slow
-def test_scores_on_dask_are_those_of_this_machine(folder: Path, tmp_path: Path) -> None:
+def test_scores_on_dask_are_those_of_this_machine(tmp_path: Path) -> None:
     made = write_lots(tmp_path, Line(8, units=2), 3)
     assert document_of("discover", "--archive", made.folder, "--dask", "local", "--workers", "1")["pooled"]["lots"] == 3
 

@@ -102,7 +102,7 @@ def test_a_shock_without_a_scale_is_refused_with_the_key(tmp_path: Path) -> None
         assert "--set FILE.toml" in told or "part.toml" in told
 
 
-def test_a_dash_is_standard_output(measured: Archive, home: Path) -> None:
+def test_a_dash_is_standard_output_and_what_is_refused_writes_nothing(measured: Archive, home: Path) -> None:
     archive = ("--archive", measured.root)
     export = ("export", "latest", "--units", "A1", "--include", "failed", *archive)
     _, printed, _ = given(*export)
@@ -120,6 +120,9 @@ def test_a_dash_is_standard_output(measured: Archive, home: Path) -> None:
         ("plan", "optimise", "--output", "-", "--json"),
     ):
         refused(*words)
+    recipe = ROOT / "deploy" / "recipes" / "procedures" / "tilt.toml"
+    for words in (("optimise", recipe), (recipe, "--output", "page.html")):
+        assert "its procedures have no multi_position" in refused("plan", *words)
     assert list(home.iterdir()) == []
 
 
@@ -133,12 +136,6 @@ def test_exports_need_a_nominal_scale_and_a_file_for_each_unit(measured: Archive
     assert "nominal scale of unit A1: -1, a positive output per g is needed" in told
     assert "3 files in this format" in refused(*words, "ardupilot", "--include", "failed")
     assert "is not text" in refused(*words, "matlab", "--include", "failed")
-
-
-def test_a_recipe_of_procedures_has_no_dwells_to_optimise(home: Path) -> None:
-    recipe = ROOT / "deploy" / "recipes" / "procedures" / "tilt.toml"
-    for words in (("optimise", recipe), (recipe, "--output", "page.html")):
-        assert "its procedures have no multi_position" in refused("plan", *words)
 
 
 def test_a_clock_of_a_station_that_is_served_faster_runs_faster_and_goes_on() -> None:

@@ -205,9 +205,8 @@ def test_the_main_job_prints_what_the_readme_shows(home: Path) -> None:
     assert not pages.unlike(own, f"…{told}…", 0.5)
     verdict = re.search(r"^model +(.*)$", block[1], flags=re.MULTILINE)
     assert verdict is not None
-    assert not wrong(
-        "tumbleline diagnose latest", f"{verdict[1]}…", 0.5
-    )  # the command that the run names says the same
+    # the command that the run names says the same
+    assert not wrong("tumbleline diagnose latest", f"{verdict[1]}…", 0.5)
 
 
 @pytest.mark.slow

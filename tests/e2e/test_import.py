@@ -90,7 +90,7 @@ def test_the_command_that_inspect_prints_imports_the_file(write, record: Recordi
     assert read_dwells(document["run"])["time_s"].iloc[-1] == pytest.approx(record.time[-1], abs=6.0)
 
 
-def test_inspect_draws_the_record_and_writes_a_page(record: Recording) -> None:
+def test_inspect_draws_the_record_writes_a_page_and_names_faults(record: Recording) -> None:
     Path("a.csv").write_text(frozen_file(record), encoding="utf-8")
     document = document_of("inspect", "a.csv", "--output", "a.svg", "--output", "a.html", status=0)
     assert [(fault["fault"], fault["axis"]) for fault in document["faults"]] == [("stuck_output", "z")]
@@ -99,6 +99,14 @@ def test_inspect_draws_the_record_and_writes_a_page(record: Recording) -> None:
     page = Path("a.html").read_text(encoding="utf-8")
     assert "the axis is constant" in page
     assert document["command"].replace("'", "&#39;") in page
+    frame = recordings.table(recordings.counts(np.random.default_rng(11), directions=FACES, noise=20.0))
+    frame["ax"] = frame["ax"].clip(-15_000, 15_000)  # an axis at the end of its range is told as clipped
+    count = int((frame["ax"].abs() == 15_000).sum())  # two whole dwells, and moments of the moves
+    said = text_of("inspect", written(frame))
+    told = re.search(r"axis x is clipped: (\d+) samples", said)
+    assert told, said
+    assert 0.9 * count <= int(told[1]) <= count
+    assert "axis y is clipped" not in said
 
 
 def test_inspect_says_in_capitals_what_a_file_does_not_say_and_offers_to_join_several(record: Recording) -> None:
@@ -111,17 +119,6 @@ def test_inspect_says_in_capitals_what_a_file_does_not_say_and_offers_to_join_se
     assert "add --set join=rows (one after the other) or --set join=" in out
     assert out.rstrip().splitlines()[-1].startswith("tumbleline import ")
     assert "--set join=rows (one" not in text_of("inspect", *parts, "--set", "join=rows")
-
-
-def test_an_axis_at_the_end_of_its_range_is_told_as_clipped() -> None:
-    frame = recordings.table(recordings.counts(np.random.default_rng(11), directions=FACES, noise=20.0))
-    frame["ax"] = frame["ax"].clip(-15_000, 15_000)
-    count = int((frame["ax"].abs() == 15_000).sum())  # two whole dwells, and moments of the moves
-    said = text_of("inspect", written(frame))
-    told = re.search(r"axis x is clipped: (\d+) samples", said)
-    assert told, said
-    assert 0.9 * count <= int(told[1]) <= count
-    assert "axis y is clipped" not in said
 
 
 def damaged(frame: pd.DataFrame, row: int, column: str) -> pd.DataFrame:
@@ -222,7 +219,7 @@ def test_torn_words_are_named_and_left_out_of_the_means(record: Recording, rng: 
         np.testing.assert_allclose(one["mean"], other["mean"], atol=2.0)  # 7 with the torn words
 
 
-def test_two_files_one_after_another_are_one_recording(record: Recording) -> None:
+def test_two_files_one_after_another_or_side_by_side_are_one_recording(record: Recording) -> None:
     frame = recordings.table(record)
     half = record.spans[4][0] + 100
     first = written(frame.iloc[:half], "1.csv")
@@ -235,11 +232,8 @@ def test_two_files_one_after_another_are_one_recording(record: Recording) -> Non
     assert all(not one["start_s"] < boundary < one["end_s"] for one in document["dwell_list"])
     other = written(frame.rename(columns={"ax": "bx"}), "3.csv")
     assert "the same are needed" in refused_import(first, other, *MAPPED, "--set", "join=rows")
-
-
-def test_columns_of_two_files_stand_side_by_side_by_their_clocks(record: Recording) -> None:
-    slow = np.arange(0.0, record.time[-1] + 2.0, 1.0)
-    files = (written(recordings.table(record), "acc.csv"), written(pd.DataFrame({"t": slow, "ax": 20.0 + 0.1 * slow})))
+    slow = np.arange(0.0, record.time[-1] + 2.0, 1.0)  # columns of two files stand side by side by their clocks
+    files = (written(frame, "acc.csv"), written(pd.DataFrame({"t": slow, "ax": 20.0 + 0.1 * slow})))
     words = ("--map", "time=t,x=ax,y=ay,z=az,temperature=2:ax", *MAPPED[2:], "--set", "join=columns")
     dwells = read_dwells(imported(*files, *words)["run"])
     np.testing.assert_allclose(dwells["unit_C"], 20.0 + 0.1 * dwells["time_s"], atol=1e-6)
@@ -255,30 +249,17 @@ def test_a_list_of_dwells_has_residual_and_influence_of_a_fit(rng: np.random.Gen
     assert all(row["influence"] >= 0.0 for row in document["dwell_list"])
 
 
-def test_window_threshold_and_shortest_decide_what_a_dwell_is(record: Recording) -> None:
-    path = written(recordings.table(record))
+def test_settings_decide_what_a_dwell_is_a_stated_unit_is_taken_and_a_dead_axis_is_named(record: Recording) -> None:
+    frame = recordings.table(record)
+    path = written(frame)
     assert imported(path, *MAPPED, "--set", "shortest_s=4")["dwells"] < 9
     assert imported(path, *MAPPED, "--set", "threshold=0.001")["dwells"] == 0
-    found = imported(path, *MAPPED, "--set", "window_s=0.5")
-    assert found["dwells"] == 9
-    status, _, err = given("export", found["run"])
-    assert status in {2, 3}
-    assert f"tumbleline fit {found['run']} --effects" in err
-    assert "give its command again" not in err
-
-
-def test_a_unit_that_the_file_states_is_taken_and_not_contradicted(record: Recording) -> None:
-    frame = recordings.table(record)
-    frame[["ax", "ay", "az"]] /= 16384.0
-    path = written(frame.set_axis(["t [s]", "ax [g]", "ay [g]", "az [g]"], axis=1))
-    words = (path, "--map", "time=t [s],x=ax [g],y=ay [g],z=az [g]", "--units", "A1")
+    assert imported(path, *MAPPED, "--set", "window_s=0.5")["dwells"] == 9
+    in_g = (frame * [1.0, *[1.0 / 16384.0] * 3]).set_axis(["t [s]", "ax [g]", "ay [g]", "az [g]"], axis=1)
+    words = (written(in_g), "--map", "time=t [s],x=ax [g],y=ay [g],z=az [g]", "--units", "A1")
     assert imported(*words)["out_unit"] == "g"
     assert "the file states g for its output" in refused_import(*words, "--unit-of", "output=m/s^2")
-
-
-def test_a_dead_axis_is_named_instead_of_asking_for_more_poses(record: Recording) -> None:
-    frame = recordings.table(record)
-    frame["ay"] = np.round(frame["ay"] * 0.0 + 12.0 + np.random.default_rng(3).normal(0.0, 4.0, len(frame)))
+    frame["ay"] = np.round(12.0 + np.random.default_rng(3).normal(0.0, 4.0, len(frame)))
     told = refused_import(written(frame), *MAPPED, *FITTED)
     assert "axis y changes by" in told
     assert "add poses" not in told
@@ -293,19 +274,12 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     assert "12000 samples, 1 dwell in LSB" in told
     assert "one pose whose force is not known: 'tumbleline noise allan' gives its noise" in told
     assert "--set face=+x … -z" in told
-    mapped = (
-        "--map",
-        f"{MAPPED[1]},temperature=temp",
-        "--units",
-        "P1",
-        "--set",
-        "face=+z",
-        "--set",
-        "local_gravity_m_s2=9.81",
-    )
+    set_up = ("--set", "face=+z", "--set", "local_gravity_m_s2=9.81")
+    mapped = ("--map", f"{MAPPED[1]},temperature=temp", "--units", "P1", *set_up)
     told = text_of("import", "a.csv", *mapped, "--unit-of", "output=LSB", "--set", "block_s=10")
     assert "12 dwells in LSB" in told
     assert "one pose whose" not in told
+    assert "give its command again" not in given("export", "latest")[2]
     fit = ("fit", "latest", "--effects", "bias,bias_temperature")
     _, out, err = given(*fit)
     said = " ".join((out + err).split())
@@ -319,15 +293,11 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
 
 def test_faces_without_a_known_noise_print_no_number_that_is_none() -> None:
     means = FACES @ np.diag([1.01, 0.99, 1.0]) + [0.02, -0.01, 0.03] + 1e-4 * np.sin(np.arange(18.0).reshape(6, 3))
-    orders = {
-        "6 degrees of freedom": range(6),
-        "+y exchanged": [2, 1, 0, 3, 4, 5],
-        "fault axis_flip": [0, 1, 3, 4, 5, 2],
-    }
+    exchanged, flipped = [2, 1, 0, 3, 4, 5], [0, 1, 3, 4, 5, 2]
+    orders = {"6 degrees of freedom": range(6), "+y exchanged": exchanged, "fault axis_flip": flipped}
     for verdict, order in orders.items():
-        frame = pd.DataFrame(means[list(order)], columns=["x", "y", "z"]).assign(
-            face=["xp", "xm", "yp", "ym", "zp", "zm"]
-        )
+        faces = ["xp", "xm", "yp", "ym", "zp", "zm"]
+        frame = pd.DataFrame(means[list(order)], columns=["x", "y", "z"]).assign(face=faces)
         _, said, _ = given(
             "import", written(frame), "--map", "x=x,y=y,z=z,dwell=face", "--set", "rows=dwells", "--unit-of", "output=g",
             "--units", "S1", "--set", f"poses={UP}", "--set", "local_gravity_m_s2=9.81", "--fit", "faces",

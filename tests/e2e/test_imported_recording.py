@@ -1,7 +1,4 @@
-"""A recording made elsewhere all the way, as commands: import, diagnose, extend, fit, history, export, report, certificate.
-
-Without a statement of its references it is noise only and gets no certificate; with one it has a budget and may be certified.
-"""
+"""A recording made elsewhere all the way, as commands: import, diagnose, extend, fit, history, export, report, certificate."""
 
 import json
 from pathlib import Path
@@ -191,22 +188,13 @@ def test_angles_of_a_table_are_poses_for_a_fit_as_for_a_diagnosis() -> None:
     )
     dwells[[*SPREAD_COLUMNS]] = np.outer(3e-5 * np.sqrt(dwells["n"]), np.ones(3))
     dwells.assign(unit="P1", dwell=range(len(outer))).to_csv("table.csv", index=False)
-    words = (
-        "table.csv",
-        "--map",
-        f"{DWELLS},outer=outer_deg,inner=inner_deg",
-        "--unit-of",
-        "output=g",
-        "--units",
-        "P1",
-    )
-    run = document_of("import", *words, "--set", "rows=dwells")["run"]
+    words = ("--unit-of", "output=g", "--units", "P1", "--set", "rows=dwells", "--map")
+    poses = "outer=outer_deg,inner=inner_deg"
+    run = document_of("import", "table.csv", *words, f"{DWELLS},{poses}")["run"]
     fitted, of_file = document_of("fit", run, status=0), document_of("diagnose", "table.csv", status=0)
     assert fitted["adequate"] is of_file["adequate"] is True
     assert document_of("diagnose", run)["error"] == pytest.approx(of_file["error"])
-    bare = document_of(
-        "import", *words[:2], f"{COLUMNS},outer=outer_deg,inner=inner_deg", *words[3:], "--set", "rows=dwells"
-    )["run"]
+    bare = document_of("import", "table.csv", *words, f"{COLUMNS},{poses}")["run"]
     by_residuals = document_of("fit", bare, status=0)  # the noise that no samples tell is that of the residuals
     assert by_residuals["adequate"] is True
     units = [json.loads(given("export", one["run"])[1])["units"][0] for one in (fitted, by_residuals)]
@@ -264,9 +252,7 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
     assert "local gravity" in Path("H1_1.xml").read_text(encoding="utf-8")
     text_of("verify", status=0)
     text_of("certificate", "revoke", "H1", "--reason", "fell to the floor", status=0)
-    page = (
-        Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")
-    )  # made again, as that of a captured run is
+    page = Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")  # made again, as that of a captured run
     assert '<span class="tag fail">revoked</span>' in page
     assert "fell to the floor" in page
 
@@ -302,15 +288,12 @@ SLIPS = {
 }
 
 
-@each(SLIPS)
-def test_a_statement_with_a_slip_is_refused(words: str) -> None:
-    old, new, *more = SLIPS[words]
+@each([*SLIPS, "add --set measured=YYYY-MM-DD"])
+def test_a_statement_with_a_slip_or_without_a_day_is_refused(words: str) -> None:
+    old, new, *more = SLIPS.get(words, ("", ""))
     Path("lab.toml").write_text(REFERENCES.replace(old, new) if old else REFERENCES, encoding="utf-8")
-    assert words in refused(*hand_held(*STATED, *more))
-
-
-def test_the_day_of_the_measurement_is_needed_beside_references() -> None:
-    assert "add --set measured=YYYY-MM-DD" in refused(*hand_held("--references", "lab.toml"))
+    stated = STATED if words in SLIPS else STATED[:2]
+    assert words in refused(*hand_held(*stated, *more))
 
 
 def test_a_level_error_of_a_plate_is_named_where_the_headings_are_given() -> None:

@@ -127,18 +127,8 @@ def test_six_faces_are_named_by_what_they_read_and_two_exchanged_labels_are_told
     how = ["--map", "x=X,y=Y,z=Z,dwell=Position", "--unit-of", "output=g", "--set", "rows=dwells", "--units", "A"]
     labels = dict(zip([f"side {k}" for k in (2, 1, 0, 3, 4, 5)], faces, strict=True))  # +x and +y exchanged
     poses = ",".join(f"{label}={face}" for label, face in labels.items())
-    answer = document_of(
-        "import",
-        "six.csv",
-        *how,
-        "--set",
-        f"poses={poses}",
-        "--set",
-        f"local_gravity_m_s2={G}",
-        "--fit",
-        "faces",
-        status=1,
-    )
+    how += ["--set", f"poses={poses}", "--set", f"local_gravity_m_s2={G}", "--fit", "faces"]
+    answer = document_of("import", "six.csv", *how, status=1)
     assert "with +x and +y exchanged they agree" in answer["reason"]
 
 
@@ -175,9 +165,8 @@ def test_several_files_of_one_sensor_are_one_recording_in_one_command(rng: np.ra
     assert 26 <= one["dwells"] <= 30
     assert document_of(*shlex.split(one["command"])[1:], status=0)["run"] == one["run"]
     assert "'latest' is no file; give one run, or files only" in refused("improve", "latest", "a.csv")
-    tables = pd.DataFrame(
-        {"unit": ["A"], "dwell": [0], "time_s": [0.0], "out_x": [0.0], "out_y": [0.0], "out_z": [1.0]}
-    )
+    columns = ["unit", "dwell", "time_s", "out_x", "out_y", "out_z"]
+    tables = pd.DataFrame([["A", 0, 0.0, 0.0, 0.0, 1.0]], columns=columns)
     for name in ("d1.csv", "d2.csv"):
         tables.to_csv(name, index=False)
     assert "2 tables of dwells, one is needed" in refused("improve", "d1.csv", "d2.csv")

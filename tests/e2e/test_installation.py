@@ -49,7 +49,7 @@ def test_a_missing_library_is_one_line_with_the_remedy(case: tuple[str, str], tm
     assert "defect" not in done.stderr
 
 
-def test_a_library_that_is_missing_or_does_not_load_is_named_with_the_reason(
+def test_a_library_that_is_missing_or_does_not_load_is_named_with_the_reason_and_no_other_error_is_its_fault(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     problem = raised(tmp_path / "site-packages" / "needy.py", "import absent_one.part", monkeypatch)
@@ -60,14 +60,11 @@ def test_a_library_that_is_missing_or_does_not_load_is_named_with_the_reason(
     text = "raise ImportError('libx.so.1: cannot open shared object file')"
     problem = raised(tmp_path / "site-packages" / "torn.py", text, monkeypatch)
     assert (not_installed(problem) or "").startswith("the library 'torn' cannot be loaded (libx.so.1: cannot open")
-
-
-def test_other_errors_are_no_fault_of_the_installation(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     of_a_user = raised(tmp_path / "my_effect.py", "import absent_one", monkeypatch)
     # a module of this product that is not there is a defect
     defect = raised(tmp_path / "site-packages" / "old_plugin.py", "import inertial.no_such_module", monkeypatch)
-    for problem in (of_a_user, defect, ValueError("x"), ImportError("made, not raised")):
-        assert not_installed(problem) is None
+    for other in (of_a_user, defect, ValueError("x"), ImportError("made, not raised")):
+        assert not_installed(other) is None
 
 
 def test_work_of_the_workbench_says_it_too(

@@ -10,6 +10,7 @@ from in_process import command
 from long_suites import mostly_slow
 
 from pipelines.importers import files
+from pipelines.importers.triads import triad
 from schemas.errors import DataRejected, TumblelineError, WrongUse
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "contract"))
@@ -90,7 +91,9 @@ def test_a_recording_of_a_robot_becomes_a_model(tmp_path, monkeypatch):
     assert "x: bias 0.10" in done.stdout, done.stdout
 
 
-def test_positions_logged_back_to_back_are_faces_by_their_own_names(tmp_path, monkeypatch):
+def test_positions_logged_back_to_back_are_faces_by_their_own_names_and_an_array_of_three_is_a_triad(
+    tmp_path, monkeypatch
+):
     """Their labels were those of dwells, which no import of such a record has."""
     monkeypatch.chdir(tmp_path)
     table = np.column_stack([0.01 * np.arange(2400), six_faces()])
@@ -98,11 +101,6 @@ def test_positions_logged_back_to_back_are_faces_by_their_own_names(tmp_path, mo
     done = command(["improve", "six.csv"])
     assert done.returncode in {0, 1}, done.stderr
     assert "x: bias 0.10" in done.stdout
-
-
-def test_an_array_of_three_is_a_triad():
-    from pipelines.importers.triads import triad
-
     outputs = six_faces(30)
     columns = {f"accelerometer_m_s2[{k}]": outputs[:, k] for k in range(3)} | {"gyro_rad[0]": np.arange(180.0)}
     assert triad(columns, {}).names == tuple(f"accelerometer_m_s2[{k}]" for k in range(3))

@@ -1,8 +1,4 @@
-"""The commands that are printed to be given next run as they are printed, in their order.
-
-The modules that print such commands are discovered: each has a case here, or its lines are run by the test that is named in
-``ELSEWHERE``.
-"""
+"""The commands that are printed to be given next run as they are printed, in their order, whichever module prints them."""
 
 import ast
 import re
@@ -93,18 +89,8 @@ def _refuted(folder: Path) -> tuple[int, str, str]:
 
 def _imported(folder: Path) -> tuple[int, str, str]:
     columns = "unit=unit,dwell=dwell,time=time_s,x=out_x,y=out_y,z=out_z,n=n"
-    words = (
-        "--map",
-        columns,
-        "--unit-of",
-        "output=g",
-        "--set",
-        "rows=dwells",
-        "--fit",
-        "norm",
-        "--set",
-        "local_gravity_m_s2=9.80665",
-    )
+    words = ("--map", columns, "--unit-of", "output=g", "--set", "rows=dwells", "--fit", "norm")
+    words += ("--set", "local_gravity_m_s2=9.80665")
     return given("import", folder / "norms.csv", *words, "--archive", folder / "kept runs")
 
 
@@ -118,19 +104,11 @@ def _improved(folder: Path) -> tuple[int, str, str]:
     pd.DataFrame(output, columns=["acc_x (g)", "acc_y (g)", "acc_z (g)"]).assign(time_s=np.arange(4000) / 100.0).to_csv(
         folder / "turned by hand.csv", index=False
     )
-    return given(
-        "improve",
-        folder / "turned by hand.csv",
-        "--output",
-        folder / "improved.toml",
-        "--archive",
-        folder / "kept runs",
-    )
+    words = ("--output", folder / "improved.toml", "--archive", folder / "kept runs")
+    return given("improve", folder / "turned by hand.csv", *words)
 
 
-CASES = {
-    "rerun": _rerun, "run": _run, "history": _refuted, "import_": _imported, "improve_text": _improved,
-}  # fmt: skip
+CASES = {"rerun": _rerun, "run": _run, "history": _refuted, "import_": _imported, "improve_text": _improved}
 
 
 @pytest.mark.parametrize("module", CASES)
@@ -257,11 +235,8 @@ pastable = pytest.mark.usefixtures("home", "no_next_measurement")
 
 @pastable
 def test_the_printed_lines_carry_the_history_and_confirm_the_effect(lagging: Run) -> None:
-    names = {
-        "dwells": "a/run7.parquet", "history": "b/temperatures.parquet", "fresh": "a/again.parquet",
-        "fresh_history": "b/again-temperatures.parquet",
-    }  # fmt: skip
-    written(lagging, names)
+    names = ("a/run7.parquet", "b/temperatures.parquet", "a/again.parquet", "b/again-temperatures.parquet")
+    written(lagging, dict(zip(("dwells", "history", "fresh", "fresh_history"), names, strict=True)))
     _, out, _ = given("diagnose", "a/run7.parquet", "--temperatures", "b/temperatures.parquet")
     lines = printed_commands(out.split("Next:", 1)[1])
     assert [words[0] for words in lines] == ["extend", "history"]
@@ -278,11 +253,9 @@ def test_the_printed_lines_carry_the_history_and_confirm_the_effect(lagging: Run
 
 @pastable
 def test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines(lagging: Run) -> None:
-    names = {
-        "dwells": "dwells.parquet", "history": "history.parquet", "fresh": "fresh.parquet",
-        "fresh_history": "fresh-history.parquet",
-    }  # fmt: skip
-    written(lagging, names)
+    written(
+        lagging, {name: f"{name.replace('_', '-')}.parquet" for name in ("dwells", "history", "fresh", "fresh_history")}
+    )
     _, out, err = given("diagnose", "dwells.parquet")
     assert "history: history.parquet, found beside the dwells" in err
     lines = printed_commands(out.split("Next:", 1)[1])

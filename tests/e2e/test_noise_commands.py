@@ -57,13 +57,20 @@ def test_the_deviations_are_those_of_allantools_and_terms_have_a_value_or_a_limi
     assert "≤" in printed
 
 
-def test_the_density_gives_the_deviation_and_the_level_of_white_noise(record: Path) -> None:
-    (spectrum,) = document_of("noise", "psd", record, "--rate", "100", "--map", "ax", "--unit-of", "output=g")[
-        "spectra"
-    ]
+def test_the_density_gives_the_deviation_and_the_level_of_white_noise_and_is_drawn(
+    record: Path, tmp_path: Path
+) -> None:
+    document = document_of("noise", "psd", record, "--rate", "100", "--map", "ax", "--unit-of", "output=g")
+    (spectrum,) = document["spectra"]
     assert spectrum["median_amplitude"] == pytest.approx(N * np.sqrt(2.0), rel=0.03)
     np.testing.assert_allclose(spectrum["deviation_from_density"], spectrum["deviation"], rtol=0.15)
     np.testing.assert_allclose(spectrum["deviation"], N / np.sqrt(spectrum["tau_s"]), rtol=0.15)
+    pictures = ("--output", tmp_path / "a.png", "--output", tmp_path / "a.html")
+    text_of("noise", "psd", record, "--map", "time=t", *pictures, status=0)
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "a.html").read_text(encoding="utf-8").count("<svg") == 1
+    told = refused("noise", "allan", record, "--map", "time=t", "--output", tmp_path / "a.bmp")
+    assert "picture: .svg, .png, .pdf" in told
 
 
 STATISTICS = {
@@ -96,26 +103,6 @@ def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have
     printed = text_of(*words)
     assert name.split()[0] in printed
     assert ("no interval" in printed) == (statistic in WITHOUT_INTERVAL)
-
-
-def test_a_spectrum_is_drawn_and_a_picture_of_no_known_kind_is_refused(record: Path, tmp_path: Path) -> None:
-    text_of(
-        "noise",
-        "psd",
-        record,
-        "--map",
-        "time=t",
-        "--output",
-        tmp_path / "a.png",
-        "--output",
-        tmp_path / "a.html",
-        status=0,
-    )
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "a.html").read_text(encoding="utf-8").count("<svg") == 1
-    assert "picture: .svg, .png, .pdf" in refused(
-        "noise", "allan", record, "--map", "time=t", "--output", tmp_path / "a.bmp"
-    )
 
 
 def test_a_wrong_name_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_told(record: Path, tmp_path: Path) -> None:
@@ -162,9 +149,8 @@ def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     x = 1e-3 * fractional(rng, 1, 60_000)[0] + 1e-4 * rng.standard_normal(60_000)
     pd.DataFrame({"x": x}).to_csv(tmp_path / "flicker.csv", index=False)
-    terms = {
-        row["term"]: row for row in document_of("noise", "allan", tmp_path / "flicker.csv", "--rate", "1")["terms"]
-    }
+    document = document_of("noise", "allan", tmp_path / "flicker.csv", "--rate", "1")
+    terms = {row["term"]: row for row in document["terms"]}
     assert 0.7e-3 < terms["B"]["value"] < 1.4e-3
 
 

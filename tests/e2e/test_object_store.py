@@ -120,10 +120,16 @@ def test_eight_writers_of_one_unit_lose_nothing(query: str) -> None:
     assert {e.run for e in events} == {f"r-{n}" for n in range(1, 9)}
 
 
-def test_a_second_capture_is_refused_and_a_dead_one_does_not_block(query: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_capture_and_a_folder_that_is_no_archive_are_refused_and_a_dead_capture_does_not_block(
+    query: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place = Archive(f"s3://factory/locks?{query}").root / "captures" / "c"
     with alone(place), pytest.raises(OperatorNeeded, match="another process is measuring"), alone(place):
         pass
+    archive = Archive(f"s3://factory/foreign?{query}")
+    (archive.root / "holiday.jpg").write_bytes(b"x")
+    with pytest.raises(ArchiveUnusable, match=r"s3://factory/foreign holds other files and no archive"):
+        archive.prepare()
     (place / "claim-dead").write_bytes(b"")
     with pytest.raises(OperatorNeeded), alone(place):
         pass
@@ -131,13 +137,6 @@ def test_a_second_capture_is_refused_and_a_dead_one_does_not_block(query: str, m
     with alone(place):
         pass
     assert not list(place.iterdir())
-
-
-def test_a_folder_of_the_store_that_is_no_archive_is_refused(query: str) -> None:
-    archive = Archive(f"s3://factory/foreign?{query}")
-    (archive.root / "holiday.jpg").write_bytes(b"x")
-    with pytest.raises(ArchiveUnusable, match=r"s3://factory/foreign holds other files and no archive"):
-        archive.prepare()
 
 
 @each(["nosuch/archive?{query}", "factory/a?endpoint_override=127.0.0.1:9&scheme=http&region=us-east-1"])

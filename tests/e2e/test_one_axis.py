@@ -37,6 +37,8 @@ grade = "consumer"
 verification_norm_ug = { max = 5000.0, unit = "µg" }
 """
 ONE = 'device = "sf1500"\nsensor_axes = 1\n'
+ORTHOGONAL = 'orthogonality_mrad = { max = 5.0, unit = "mrad" }\n'
+"""A limit, not a line of the recipe."""
 
 
 @pytest.fixture(scope="module")
@@ -74,41 +76,34 @@ def test_one_axis_has_the_outputs_and_coefficients_of_that_axis_of_a_triad(measu
 
 
 def test_the_budget_of_one_axis_is_that_of_the_axis_of_a_triad(measured) -> None:
-    rows = [
-        table(measured, "uncertainties", which).set_index(["unit", "quantity", "axis"]) for which in ("one", "three")
-    ]
+    key = ["unit", "quantity", "axis"]
+    rows = [table(measured, "uncertainties", which).set_index(key) for which in ("one", "three")]
     both = rows[0].join(rows[1], suffixes=("", "_triad"))
     stated = both[both["u_b"] > 0.0]
     assert {"bias", "scale", "misalignment", "output", "bias_error"} <= set(stated.index.get_level_values("quantity"))
     ratio = (stated["u_b"] / stated["u_b_triad"]).groupby("quantity")
     for name in ("bias", "scale", "misalignment"):
         assert np.allclose(ratio.get_group(name), 1.0, atol=0.05)
-    for name in (
-        "output",
-        "bias_error",
-    ):  # of a triad, the symmetric part of what its axes answer across is an error, too
+    for name in ("output", "bias_error"):  # of a triad, the symmetric part of what its axes answer across is one, too
         assert (ratio.get_group(name) < 1.01).all()
         assert (ratio.get_group(name) > 0.7).all()
     assert "orthogonality" not in rows[0].index.get_level_values("quantity")
 
 
-def test_noise_verdict_and_grades_are_those_of_one_axis(measured) -> None:
-    assert set(table(measured, "noise", "one")["axis"]) == {"x"}
-    assert set(table(measured, "residuals", "one")["axis"]) == {"x"}
-    assert (table(measured, "grades", "one")["outcome"] == "pass").all()
+def test_samples_noise_verdict_grades_and_report_are_those_of_one_axis(measured) -> None:
     folder, runs = measured
-    found = document_of("diagnose", runs["one"], "--archive", folder / "archive", "--json")
-    assert found["adequate"] is True
-    assert found["classes"] == []
-
-
-def test_samples_of_an_axis_that_is_not_there_are_no_numbers(measured) -> None:
-    folder, runs = measured
-    records = Archive(folder / "archive").run(runs["one"]).records
-    assert records is not None
-    first = next(records.samples([0]))
+    run = Archive(folder / "archive").run(runs["one"])
+    first = next(run.records.samples([0]))
     assert np.isfinite(first["x"]).all()
     assert first[["y", "z"]].isna().all(axis=None)
+    assert set(run.table("noise")["axis"]) == set(run.table("residuals")["axis"]) == {"x"}
+    assert (run.table("grades")["outcome"] == "pass").all()
+    found = document_of("diagnose", runs["one"], "--archive", folder / "archive", "--json")
+    assert (found["adequate"], found["classes"]) == (True, [])
+    report = run.report.read_bytes().decode()
+    assert "error of |a| on poses not used, worst pose</td><td>all</td>" in report
+    for words in ("error of the magnitude", "difference between the magnitude", ">norm</td>"):
+        assert words not in report
 
 
 def test_its_certificate_and_its_memory_hold_one_axis(measured) -> None:
@@ -196,14 +191,6 @@ def test_its_plan_speaks_of_one_axis(measured) -> None:
         assert words not in page
 
 
-def test_its_report_speaks_of_its_axis(measured) -> None:
-    folder, runs = measured
-    report = Archive(folder / "archive").run(runs["one"]).report.read_bytes().decode()
-    assert "error of |a| on poses not used, worst pose</td><td>all</td>" in report
-    for words in ("error of the magnitude", "difference between the magnitude", ">norm</td>"):
-        assert words not in report
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "figures", "effect"),
@@ -241,6 +228,7 @@ def test_what_one_axis_hides_is_named(kind: str, figures: str, effect: str, tmp_
             "it measures axis z, the device has x",
         ),
         ("sensor_axes = 1", "sensor_axes = 4", "sensor_axes"),
+        ("", ORTHOGONAL, "orthogonality_mrad needs sensor_axes = 3"),
     ],
 )
 def test_what_a_device_with_one_axis_cannot_do_is_said(
@@ -248,21 +236,12 @@ def test_what_a_device_with_one_axis_cannot_do_is_said(
 ) -> None:
     text = (measured[0] / "one.toml").read_text(encoding="utf-8")
     assert old in text
-    (tmp_path / "other.toml").write_text(text.replace(old, new), encoding="utf-8")
-    (tmp_path / "own.limits.toml").write_text(LIMITS, encoding="utf-8")
+    (tmp_path / "other.toml").write_text(text.replace(old, new) if old else text, encoding="utf-8")
+    (tmp_path / "own.limits.toml").write_text(LIMITS if old else LIMITS + new, encoding="utf-8")
     status, _, err = given("run", tmp_path / "other.toml", "--archive", tmp_path / "archive")
     assert status == UNUSABLE
     assert words in " ".join(err.split())
     assert not (tmp_path / "archive").exists()
-
-
-def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: Path) -> None:
-    (tmp_path / "one.toml").write_text((measured[0] / "one.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    limits = LIMITS + 'orthogonality_mrad = { max = 5.0, unit = "mrad" }\n'
-    (tmp_path / "own.limits.toml").write_text(limits, encoding="utf-8")
-    status, _, err = given("run", tmp_path / "one.toml", "--archive", tmp_path / "archive")
-    assert status == UNUSABLE
-    assert "orthogonality_mrad needs sensor_axes = 3" in " ".join(err.split())
 
 
 def test_its_waveforms_have_one_channel(measured, tmp_path: Path) -> None:
@@ -298,17 +277,10 @@ def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: 
     archive = ("--archive", folder / "archive")
     given("certificate", "issue", runs["one"], *archive)
     text_of("certificate", "write", "SF-02", *archive, "--laboratory", laboratory_file(tmp_path), "--output", tmp_path)
-    [document] = tmp_path.glob("*.xml")
-    text = document.read_text(encoding="utf-8")
+    text = next(tmp_path.glob("*.xml")).read_text(encoding="utf-8")
     assert "error of the corrected output, verification (largest of the poses)" in text
     assert "norm of gravity" not in text
     assert "|a|" not in text
-
-
-def pages_held(plant_memory: str) -> list[bytes]:
-    """The pages of a memory, from its hexadecimal text."""
-    memory = bytes.fromhex(plant_memory)
-    return [memory[start : start + 32] for start in range(0, len(memory), 32)]
 
 
 @pytest.mark.parametrize(("which", "letters"), mostly_slow([("three", "xyz"), ("one", "x")], ("one", "x")))
@@ -333,6 +305,7 @@ def test_teds_of_every_axis_are_in_the_memory_of_the_device_and_stay_there(
     # the memory keeps them: a second writing finds what the first left, and certificates stay as they are
     again = document_of("station", "program", runs[which], *words, "--yes", "--units", "SF-02")
     (one,) = again["teds"]
-    held = pages_held(one["before"])
+    memory = bytes.fromhex(one["before"])
+    held = [memory[start : start + 32] for start in range(0, len(memory), 32)]
     assert held[: len(letters)] == [bytes.fromhex(page["content"]) for page in one["pages"]]
     assert not any(b"".join(held[len(letters) :]))

@@ -1,9 +1,7 @@
 """The person at the station: asked at a terminal, or by the orchestrator, and answered from either."""
 
 import io
-import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -104,7 +102,7 @@ def run_at_a_terminal(folder: Path, typed: str, *options: str) -> tuple[int, str
         return given(*words, *options)
 
 
-def test_a_terminal_is_asked_and_a_scanner_types_the_serials(tmp_path: Path) -> None:
+def test_a_terminal_is_asked_and_may_stop_and_a_scanner_types_the_serials(tmp_path: Path, monkeypatch) -> None:
     status, out, err = run_at_a_terminal(tmp_path, "S1\nS2\n\n\n\n\n\n\n\n\n", "--units", "scan", "--json")
     assert status in (0, 1), err
     units = typed_document("run", out)["units"]
@@ -113,11 +111,12 @@ def test_a_terminal_is_asked_and_a_scanner_types_the_serials(tmp_path: Path) -> 
         assert words in err
     for unit in units:
         assert f"slot {unit['slot']:>2}  {unit['unit']}  {unit['outcome']}" in err[err.index("Unload") :]
-
-
-def test_an_operator_who_stops_gets_status_3_and_nothing_is_measured(tmp_path: Path) -> None:
-    assert run_at_a_terminal(tmp_path, "stop\n")[0] == 3
-    assert not list(tmp_path.glob("archive/captures/*/0*"))
+    (tmp_path / "stopped").mkdir()
+    assert run_at_a_terminal(tmp_path / "stopped", "stop\n")[0] == 3  # an operator who stops: nothing is measured
+    assert not list((tmp_path / "stopped").glob("archive/captures/*/0*"))
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n\n"))
+    with pytest.raises(Exception, match="no unit was scanned"):
+        scanned(2)
 
 
 def test_a_lot_larger_than_the_fixture_is_measured_filling_by_filling(tmp_path: Path) -> None:
@@ -131,28 +130,3 @@ def test_a_lot_larger_than_the_fixture_is_measured_filling_by_filling(tmp_path: 
     fillings = typed_document("run", out)["fillings"]
     assert [[unit["unit"] for unit in one["units"]] for one in fillings] == [["S0", "S1"], ["S2"]]
     assert err.count("Load") == err.count("Unload") == 2
-
-
-def test_a_scan_of_nothing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.stdin", io.StringIO("\n\n"))
-    with pytest.raises(Exception, match="no unit was scanned"):
-        scanned(2)
-
-
-def answered(environment: dict[str, str]) -> str:
-    """What a flow run asked; it is answered."""
-    end = time.monotonic() + 120.0
-    while time.monotonic() < end:
-        waiting = operator(environment)["waiting"]
-        if waiting:
-            assert operator(environment, waiting[0]["id"], "--answer", "go")["answered"] == "go"
-            return waiting[0]["question"]
-        time.sleep(0.2)
-    pytest.fail("no flow run asked for anything")
-
-
-def operator(environment: dict[str, str], *arguments: str) -> dict:
-    command = [sys.executable, "-m", "pipelines.cli", "station", "operator", *arguments, "--json"]
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 0, done.stderr
-    return typed_document("station", "operator", done.stdout)

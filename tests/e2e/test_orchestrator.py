@@ -54,10 +54,17 @@ def variable(line: Orchestrator, name: str, **how: str) -> int:
     return status
 
 
-def test_scheduled_runs_of_the_line_appear(line: Orchestrator) -> None:
+def test_scheduled_runs_appear_the_page_is_served_and_the_files_of_the_server_are_its_own(line: Orchestrator) -> None:
     scheduled = line.until(lambda: line.runs("production-line", "SCHEDULED"), "a scheduled run of the line", 60.0)
     assert scheduled[0]["auto_scheduled"]
     assert scheduled[0]["expected_start_time"][11:19] == "06:00:00"
+    status, page = line.ask("/", key="")
+    assert (status, "<html" in page) == (200, True)
+    assert list((line.home / "ui").glob("v*/index.html"))  # where the code may not be written to
+    assert stat.S_IMODE(line.home.stat().st_mode) == 0o700
+    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in line.home.glob("prefect.db*")}
+    assert "prefect.db" in modes
+    assert {name: oct(mode) for name, mode in modes.items() if mode & 0o077} == {}
 
 
 WITHOUT_KEY = [
@@ -88,18 +95,19 @@ STRANGERS = [
 ]  # fmt: skip
 
 
-@each([(path, how) for path in ("events/in", "events/out", "logs/out") for how in STRANGERS])
-def test_a_websocket_of_a_stranger_is_not_opened(case: tuple[str, dict], line: Orchestrator) -> None:
+@each([("events/in", None), *((path, how) for path in ("events/in", "events/out", "logs/out") for how in STRANGERS)])
+def test_a_websocket_is_opened_with_the_key_and_not_to_a_stranger(
+    case: tuple[str, dict | None], line: Orchestrator
+) -> None:
     path, how = case
+    if how is None:  # the own page: opened with the key, and closed at once without
+        for key in ("", "tumbleline:wrong"):
+            with pytest.raises(websockets.ConnectionClosed, match="1008"):
+                asyncio.run(greet(line, path, key))
+        assert asyncio.run(greet(line, path, line.key))["type"] == "auth_success"
+        return
     with pytest.raises(websockets.InvalidStatus, match="403"):
         asyncio.run(greet(line, path, line.key, **how))
-
-
-def test_a_websocket_is_opened_with_the_key_and_closed_at_once_without(line: Orchestrator) -> None:
-    for key in ("", "tumbleline:wrong"):
-        with pytest.raises(websockets.ConnectionClosed, match="1008"):
-            asyncio.run(greet(line, "events/in", key))
-    assert asyncio.run(greet(line, "events/in", line.key))["type"] == "auth_success"
 
 
 async def greet(line: Orchestrator, path: str, key: str, called: str = "127.0.0.1", **how: object) -> dict:
@@ -107,20 +115,6 @@ async def greet(line: Orchestrator, path: str, key: str, called: str = "127.0.0.
     async with websockets.connect(f"ws://{called}:{line.port}/api/{path}", **where) as socket:
         await socket.send(json.dumps({"type": "auth", "token": key}))
         return json.loads(await socket.recv())
-
-
-def test_the_page_is_served_where_the_code_may_not_be_written_to(line: Orchestrator) -> None:
-    status, page = line.ask("/", key="")
-    assert status == 200
-    assert "<html" in page
-    assert list((line.home / "ui").glob("v*/index.html"))
-
-
-def test_the_files_of_the_server_are_its_own(line: Orchestrator) -> None:
-    assert stat.S_IMODE(line.home.stat().st_mode) == 0o700
-    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in line.home.glob("prefect.db*")}
-    assert "prefect.db" in modes
-    assert {name: oct(mode) for name, mode in modes.items() if mode & 0o077} == {}
 
 
 def test_deployments_have_their_queue_and_are_found_by_their_module(line: Orchestrator) -> None:
@@ -235,19 +229,14 @@ def resident_mb(line: Orchestrator) -> float:
     return int(re.search(r"VmHWM:\s+(\d+) kB", text)[1]) / 1e3
 
 
-PLACES = ("/api/flow_runs/", "/api/flow_runs/filter", "/api/variables/")
-
-
-@each([(path, key, chunked) for path in PLACES for key in ("", "tumbleline:wrong") for chunked in (False, True)])
-def test_a_body_without_the_key_is_refused_unread(case: tuple[str, str, bool], line: Orchestrator) -> None:
-    path, key, chunked = case
-    before = resident_mb(line)
-    assert sent(line, path, 100_000_000, key, chunked=chunked) == 401
-    assert resident_mb(line) < before + 20.0
-
-
-@each([False, True])
-def test_a_body_of_more_than_a_megabyte_is_refused_with_the_key(chunked: bool, line: Orchestrator) -> None:  # noqa: FBT001
+@pytest.mark.parametrize("chunked", [False, True])
+def test_a_body_without_the_key_is_refused_unread_and_a_large_one_with_it(chunked: bool, line: Orchestrator) -> None:  # noqa: FBT001
+    places = ("/api/flow_runs/", "/api/flow_runs/filter", "/api/variables/")
+    for path, key in ((path, key) for path in places for key in ("", "tumbleline:wrong")):
+        before = resident_mb(line)
+        assert sent(line, path, 100_000_000, key, chunked=chunked) == 401
+        assert resident_mb(line) < before + 20.0
+    # with the key, where it has more than a megabyte
     assert sent(line, "/api/flow_runs/", 40_000_000, line.key, chunked=chunked) == 413
     assert sent(line, "/api/variables/", 2_000_000, line.key, chunked=chunked) == 413
     assert sent(line, "/api/logs/", 4_000_000, line.key, chunked=chunked) == 422  # read: its logs are none

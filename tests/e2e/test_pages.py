@@ -103,19 +103,13 @@ def test_profile_and_links_of_the_guide_to_devices_are_such() -> None:
     assert [(device.link, device.missing()) for device in links] == [("rtu", ""), ("tls", "")]
 
 
-def test_figures_of_the_simulated_station_are_those_of_the_text() -> None:
+def test_figures_of_the_station_and_of_its_safety_are_those_of_the_text() -> None:
     text = pages.text("docs/explanation/simulated-station.md")
     assert [kind for kind in HIDDEN if f"`{kind}`" not in text] == []
-    assert [Sampler(None, 1, form, 48000).capacity for form in ("int20x3", "int24x3", "int24x1")] == [
-        12000,
-        9600,
-        24000,
-    ]
+    forms = ("int20x3", "int24x3", "int24x1")
+    assert [Sampler(None, 1, form, 48000).capacity for form in forms] == [12000, 9600, 24000]
     qa700 = load_preset("QA700")
     assert round(1e6 * qa700.lsb / qa700.scale, 1) == 3.9
-
-
-def test_figures_of_the_stations_safety_are_those_of_the_text() -> None:
     told = tomllib.loads("\n".join(pages.blocks("docs/explanation/station-safety.md", "toml")))
     for name, kind in (("suspenders", Suspenders), ("safety", Safety)):
         assert kind.model_validate(told[name]) == kind()

@@ -130,23 +130,22 @@ def test_every_unit_is_printed_on_a_page_of_its_own(
     assert "Why it was refused" in whole
 
 
-def test_failed_and_refused_units_are_first_and_open(browser: Any, pages: dict[str, Path]) -> None:
+def test_failed_and_refused_units_are_first_and_open_and_say_why(
+    browser: Any, run: Run, pages: dict[str, Path]
+) -> None:
     page = browser.new_page()
     page.goto(pages["report"].as_uri())
     units = page.evaluate("() => [...document.querySelectorAll('details.unit')].map((e) => [e.id, e.open])")
     assert units == [["A2", True], ["A1", False], ["A3", False]]
     page.close()
-
-
-def test_a_failed_unit_says_why_and_is_before_the_others(run: Run) -> None:
     report = ReportContext(run, {})
     report.units[2].outcome, report.units[2].reasons = "fail", ["scale over temperature 900 ppm/K, 500 is allowed"]
     html = unit_by_unit.render(report)
-    assert re.findall(r'<details class="unit" id="(\w+)"( open)?>', html) == [
-        ("A2", " open"),
-        ("A3", " open"),
-        ("A1", ""),
-    ]
+    found = re.findall(r'<details class="unit" id="(\w+)"( open)?>', html)
+    assert found == [("A2", " open"), ("A3", " open"), ("A1", "")]
+    text = pages["diagnosis"].read_text(encoding="utf-8")  # a run of one soak has no caption without a picture
+    assert "ADEQUATE" in text
+    assert "reached heating" not in text
     assert re.search(r"Why it failed</h3>\s*<ul[^>]*><li>scale over temperature 900 ppm/K", html)
 
 
@@ -158,12 +157,6 @@ def test_a_page_fits_a4(browser: Any, pages: dict[str, Path], name: str, tmp_pat
     assert page.evaluate(CLIPPED) == []
     page.close()
     assert pdf(browser, pages[name], tmp_path)[0].strip()
-
-
-def test_a_run_of_one_soak_has_no_caption_without_a_picture(pages: dict[str, Path]) -> None:
-    text = pages["diagnosis"].read_text(encoding="utf-8")
-    assert "ADEQUATE" in text
-    assert "reached heating" not in text
 
 
 def pdf(browser: Any, path: Path, folder: Path) -> list[str]:

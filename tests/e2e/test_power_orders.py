@@ -65,7 +65,7 @@ def test_the_time_with_power_begins_again_and_the_readings_say_for_how_long_ther
     assert "power_off_s" not in nothing.all(1).columns  # a run that switches nothing says nothing of it
 
 
-def test_warm_up_begins_where_the_device_has_cooled_to():
+def test_warm_up_begins_where_the_device_has_cooled_to_and_stress_goes_on_without_power():
     size, tau = 4e-3, 500.0
     sink, _ = run(hidden=[WarmUp(size=size, tau=tau)])
     bias = biases(sink)[:, 0]
@@ -79,16 +79,10 @@ def test_warm_up_begins_where_the_device_has_cooled_to():
         at.append(warmth)
     expected = -size * (at[2] - (1.0 - math.exp(-middle[0] / tau)))
     assert bias[1] - bias[0] == pytest.approx(expected, abs=3e-5)
-
-
-def test_stress_goes_on_letting_go_without_power():
-    truth = StressRelaxation(size=2e-3, shortest=100.0)
-    sink, _ = run(hidden=[truth])
+    sink, _ = run(hidden=[StressRelaxation(size=2e-3, shortest=100.0)])  # which goes on letting go without power
     first, second = sink.all(1).drop_duplicates("record")["start_s"].to_numpy()[:2] + 1.0
-    bias = biases(sink)
-    assert (bias[1] - bias[0])[0] == pytest.approx(
-        2e-3 * (math.log1p(second / 100.0) - math.log1p(first / 100.0)), rel=0.2
-    )
+    bias, expected = biases(sink)[:, 0], 2e-3 * (math.log1p(second / 100.0) - math.log1p(first / 100.0))
+    assert bias[1] - bias[0] == pytest.approx(expected, rel=0.2)
 
 
 def test_the_bias_after_a_power_on_differs_by_what_the_preset_says():
@@ -147,7 +141,7 @@ def test_devices_that_a_killed_run_left_without_power_are_switched_on_and_their_
         assert plant.now == before  # not twice for one record
 
 
-def test_the_emergency_stop_ends_the_wait_and_the_devices_have_their_power_again():
+def test_the_emergency_stop_ends_the_wait_with_power_and_a_reader_that_cannot_switch_refuses_at_once(monkeypatch):
     config, lot = station_of(preset_overrides=COLD, faults=[{"kind": "emergency_stop", "at_s": 300.0}]), lot_of(2)
     plant, events = make_plant(config, lot), MemoryLog()
     recipe = recipe_with_power_off((0.0, 3000.0))
@@ -155,11 +149,7 @@ def test_the_emergency_stop_ends_the_wait_and_the_devices_have_their_power_again
         capture(station, recipe, lot, MemorySink(), progress=quiet_progress, events=events)
     assert plant.powered
     assert plant.now < 330.0
-
-
-def test_a_reader_that_cannot_switch_refuses_before_anything_moves(monkeypatch):
-    config, lot = station_of(preset_overrides=COLD), lot_of(2)
-    with open_station(config, lot) as station:
+    with open_station(station_of(preset_overrides=COLD), lot) as station:
         registers = station.reader._registers
         monkeypatch.setattr(registers, "has", lambda name: name != "power")
         with pytest.raises(StationRefused, match="no register 'power', one is needed"):

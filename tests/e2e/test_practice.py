@@ -61,12 +61,8 @@ def test_the_served_station_is_reached_by_the_file_that_it_writes_and_takes_type
         process.stdin.write("door:for_s=100000\nnonsense\n")
         process.stdin.flush()
         until(lambda: document_of("station", "status", "--station", where)["door"] == "open", "an open door")
-        now = document_of("station", "status", "--station", where)
-        assert (
-            [slot["serial"] for slot in now["slots"]]
-            == document["units"]
-            == [unit.serial for unit in practice_lot().units]
-        )
+        serials = [slot["serial"] for slot in document_of("station", "status", "--station", where)["slots"]]
+        assert serials == document["units"] == [unit.serial for unit in practice_lot().units]
         process.send_signal(signal.SIGINT)
         told = process.communicate(timeout=20.0)[1]
     assert process.returncode == 0
@@ -88,10 +84,7 @@ def test_a_line_that_comes_in_parts_is_one_fault_and_the_end_of_the_input_is_non
     faults(plant)
     os.close(read)
     assert (told, [fault.order.at_s for fault in plant.faults]) == (["door: begins now"], [5.0])
-
-
-def test_the_file_is_one_of_hardware_but_for_addresses_and_clock() -> None:
-    text, config = practice_file(5021)
+    text, config = practice_file(5021)  # one of hardware but for addresses and clock
     assert (config.kind, config.simulation) == ("modbus", None)
     assert {device.port for device in (config.devices.outer, config.devices.chamber, config.devices.slots)} == {5021}
     assert config.devices.slots.profile == load_station().devices.slots.profile

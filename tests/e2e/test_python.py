@@ -61,10 +61,9 @@ def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataF
     rows = better.calibration.coefficients.query("effect == 'bias'")
     assert np.all(np.abs(rows["value"] - [0.02, -0.01, 0.03]) < 1.5 * rows["U"])
     sizes = []
+    samples = turned[["ax", "ay", "az"]].set_axis(list("xyz"), axis=1)
     for model in (fit, better):
-        corrected = model.correct(
-            turned[["ax", "ay", "az"]].set_axis(list("xyz"), axis=1), temperature=25.0, rate_hz=100.0
-        )
+        corrected = model.correct(samples, temperature=25.0, rate_hz=100.0)
         force = corrected[["force_x_g", "force_y_g", "force_z_g"]].groupby(turned["turn"]).mean()
         sizes.append(np.sqrt(np.mean((np.linalg.norm(force, axis=1) - 1.0) ** 2)))
     assert sizes[1] < 2e-4  # noise of a mean: 1 mg/√300 = 58 µg an axis
@@ -101,8 +100,9 @@ def test_files_of_one_record_are_read_one_after_another(turned: pd.DataFrame, tm
 
 
 @pytest.mark.usefixtures("no_next_measurement")
-def test_objects_draw_themselves_and_export(turned: pd.DataFrame, tmp_path: Path) -> None:
-    run = tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7")
+def test_objects_draw_themselves_and_export_and_an_archive_is_tables(turned: pd.DataFrame, tmp_path: Path) -> None:
+    kept = tmp_path / "archive"
+    run = tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7", archive=kept)
     fit = tl.fit(run)
     diagnosis = tl.diagnose(run, fit)
     for one in (run, fit, diagnosis):
@@ -113,11 +113,6 @@ def test_objects_draw_themselves_and_export(turned: pd.DataFrame, tmp_path: Path
     assert json.loads(fit.export("json"))["units"][0]["unit"] == "SN7"
     with pytest.raises(tl.WrongUse, match="no format is called 'jsom'"):
         fit.export("jsom")
-
-
-def test_an_archive_as_tables(turned: pd.DataFrame, tmp_path: Path) -> None:
-    kept = tmp_path / "archive"
-    fit = tl.fit(tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7", archive=kept))
     view = tl.archive(kept)
     assert fit.run.id in view.runs["id"].tolist()
     rows = view.coefficients("SN7")

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from capture_double import recipe_file
-from each import each
 from in_process import command
 
 from pipelines.archive import Archive
@@ -63,18 +62,8 @@ DOOR = ("--fault", "door:at_s=200:for_s=60")
 
 
 @pytest.mark.slow
-def test_a_station_measures_on_ramps_through_an_open_door(tmp_path):
-    on_ramps(DOOR, tmp_path)
-
-
-@pytest.mark.slow
-@each([(), ("--fault", "time_out:at_s=250")])
-def test_a_station_measures_on_ramps_undisturbed_and_through_a_lost_answer(faults, tmp_path):
-    on_ramps(faults, tmp_path)
-
-
-def on_ramps(faults, tmp_path):
-    """A lot is measured on ramps with faults of the station: no unit is refused, every dwell has a temperature of its own."""
+@pytest.mark.parametrize("faults", [DOOR, (), ("--fault", "time_out:at_s=250")])
+def test_a_station_measures_on_ramps_undisturbed_through_a_lost_answer_and_an_open_door(faults, tmp_path):
     recipe = ramp_recipe(tmp_path)
     done = command(["run", recipe, "--archive", str(tmp_path / "archive"), "--direct", "--json", *faults])
     assert done.returncode in {0, 1}, done.stderr
@@ -116,20 +105,11 @@ def test_a_run_on_ramps_that_was_stopped_goes_on_to_the_same_tables(tmp_path, mo
 
 def test_the_command_writes_a_recipe_on_ramps_with_its_bound(tmp_path):
     target = tmp_path / "quick.toml"
-    words = [
-        "plan",
-        "optimise",
-        "--set",
-        "ramp=yes",
-        "--effects",
-        ",".join(THERMAL),
-        "--device",
-        "analogue",
-        "--set",
-        "factor=3",
-    ]
     page = tmp_path / "quick.html"
-    done = command([*words, "--set", "verification=1", "-o", str(target), "--output", str(page), "--json"])
+    words = ["plan", "optimise", "--effects", ",".join(THERMAL), "--device", "analogue", "-o", str(target)]
+    for setting in ("ramp=yes", "factor=3", "verification=1"):
+        words += ["--set", setting]
+    done = command([*words, "--output", str(page), "--json"])
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     assert document["ramp"] is True

@@ -62,12 +62,9 @@ def test_the_supply_of_each_slot_drifts_and_its_output_with_it_unless_a_device_r
     assert np.all(of_analogue(list(range(60, 6_000, 600)), supply_drift=0.0).std(axis=0) < 5e-5)
     plain, drifting = (of_analogue([60, 6_000], "ADXL355", supply_drift=drift) for drift in (0.0, 1e-3))
     assert np.array_equal(plain, drifting)
-
-
-def test_the_meter_has_one_gain_error_for_all_slots():
     exact, wrong = (of_analogue([60], supply_reading_ppm=ppm) for ppm in (0.0, 1000.0))
     ratio = (wrong / exact)[0]
-    assert np.ptp(ratio) < 1e-6
+    assert np.ptp(ratio) < 1e-6  # the meter has one gain error for all slots
     assert abs(ratio[0] - 1.0) > 1e-5
 
 
@@ -106,6 +103,7 @@ def test_the_supply_counts_with_the_level_at_0_g():
     assert supply(terms)["bias", "x"] == pytest.approx(20.0 * 5.0, rel=1e-3)  # 20 ppm of 1.5 V / 0.3 V/g
     assert supply(terms)["scale", "x"] == pytest.approx(20.0, rel=1e-3)
     assert supply(half)["bias", "x"] == pytest.approx(50.0, rel=1e-3)
+    assert load_station().uncertainty == load_station(STATION).uncertainty  # the built-in station states the same
 
 
 MEASURED = 'supply = { u_ppm = 20.0, ratio_measured = true, scope = "station", source = "supply_reading_ppm of the simulation" }'
@@ -136,12 +134,6 @@ def test_limits_that_no_unit_can_meet_are_told_before_an_order_is_sent(
     assert not (tmp_path / "archive" / "captures").exists()
 
 
-def test_a_unit_whose_uncertainty_exceeds_the_limit_is_not_told_to_be_measured_longer():
-    limits = Request(recipe=str(RECIPE), station=STATION).job().limits
-    assert "lower its largest contribution" in decide(limits, "bias_error_ug", 120.0, 650.0).sentence
-    assert "measure longer, or again" in decide(limits, "bias_error_ug", 700.0, 250.0).sentence
-
-
 @pytest.fixture(scope="module")
 def lot(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     """A lot with dwells of 3 s: the run, and the truth of its units."""
@@ -159,14 +151,16 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     return SimpleNamespace(run=runner.run, truths=truths, preset=plant.preset)
 
 
-def test_a_lot_of_the_analogue_part_passes_or_fails_by_its_own_errors(lot: SimpleNamespace):
-    grades = lot.run.table("grades")
-    failed = grades[grades["outcome"] != "pass"]
+def test_a_lot_fails_by_its_own_errors_alone_and_its_true_bias_and_scale_lie_within_their_uncertainty(
+    lot: SimpleNamespace,
+):
+    limits = Request(recipe=str(RECIPE), station=STATION).job().limits
+    # a unit whose uncertainty exceeds the limit is not told to be measured longer
+    assert "lower its largest contribution" in decide(limits, "bias_error_ug", 120.0, 650.0).sentence
+    assert "measure longer, or again" in decide(limits, "bias_error_ug", 700.0, 250.0).sentence
+    failed = lot.run.table("grades").query("outcome != 'pass'")
     assert len(failed) <= 1
     assert all("bias_temperature_ug_K fail" in reason for reason in failed["reasons"])
-
-
-def test_the_true_bias_and_scale_lie_within_their_stated_uncertainty(lot: SimpleNamespace):
     within, size = [], []
     of = lot.run.table("coefficients").set_index(["unit", "axis", "effect"])["value"]
     expanded = lot.run.table("uncertainties").set_index(["unit", "axis", "quantity"])["expanded"]
@@ -220,7 +214,3 @@ def test_a_plan_counts_the_noise_that_sampling_folds():
     streams = [np.random.default_rng([9, k]) for k in range(40)]
     means = UnitNoise(preset, streams).sample(2000, 100.0).reshape(20, 100, -1).mean(axis=1)
     assert means.std() == pytest.approx(slow / np.sqrt(2.0), rel=0.05)
-
-
-def test_the_built_in_station_states_the_same_as_its_file():
-    assert load_station().uncertainty == load_station(STATION).uncertainty

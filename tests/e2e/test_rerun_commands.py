@@ -43,19 +43,8 @@ def own(archive: Path, tmp_path: Path) -> Path:
 
 def process_of(archive: Path, *how: str) -> subprocess.Popen[bytes]:
     """A re-run of everything in a process of its own, in which nothing is loaded or patched."""
-    words = [
-        sys.executable,
-        "-m",
-        "pipelines.cli",
-        "rerun",
-        "all",
-        "--effects",
-        LARGER,
-        "--archive",
-        str(archive),
-        *how,
-    ]
-    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    words = [sys.executable, "-m", "pipelines.cli", "rerun", "all", "--effects", LARGER, "--archive", str(archive)]
+    return subprocess.Popen([*words, *how], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def tables(archive: Path) -> dict[str, bytes]:

@@ -45,14 +45,8 @@ def test_a_run_that_ends_early_says_so_everywhere(tmp_path: Path) -> None:
     assert sentence in text_of("show", found["run"], "--archive", root)
     assert sentence in Path(found["report"]).read_text(encoding="utf-8")
     run = Archive(root).run(found["run"])
-    about = methods(
-        run,
-        "A1",
-        run.about["recipe"],
-        LaboratoryFile.model_construct(method=SimpleNamespace(procedure="")),
-        (),
-        static=True,
-    )
+    laboratory = LaboratoryFile.model_construct(method=SimpleNamespace(procedure=""))
+    about = methods(run, "A1", run.about["recipe"], laboratory, (), static=True)
     assert any(sentence in line for line in about)
     assert end["not_reached"] == []
     text_of("rerun", found["run"], "--archive", root, "--check")
@@ -71,11 +65,8 @@ def test_a_unit_that_fails_is_told_before_the_end(tmp_path: Path) -> None:
     assert found["units"][0]["outcome"] == "fail"
 
 
-def test_an_order_needs_to_know_what_is_asked_for(tmp_path: Path) -> None:
+def test_an_order_needs_to_know_what_is_asked_for_and_refuses_what_a_run_refuses(tmp_path: Path) -> None:
     assert "no table [stop]" in refused("plan", "order", recipe_file(tmp_path))
-
-
-def test_an_order_refuses_what_a_run_refuses(tmp_path: Path) -> None:
     path = Path(ending(tmp_path))
     path.write_text(f'{path.read_text(encoding="utf-8")}visible = ["no_such"]\n', encoding="utf-8")
     said = refused("plan", "order", path)

@@ -79,9 +79,7 @@ def test_a_full_plan_with_a_prior_is_refused(tmp_path: Path) -> None:
     family_archive(root, recipe_file(tmp_path, *BRIEF), 1e-3)
     other = Path(recipe).with_name("full.toml")
     other.write_text(f"{other.read_text(encoding='utf-8')}\n[prior]\n", encoding="utf-8")
-    Path(recipe).write_text(
-        Path(recipe).read_text(encoding="utf-8").replace("quick.toml", "full.toml"), encoding="utf-8"
-    )
-    assert "key 'prior.full': full measures adxl355 with a prior" in refused(
-        "run", recipe, "--direct", "--archive", root, "--units", "U1"
-    )
+    text = Path(recipe).read_text(encoding="utf-8").replace("quick.toml", "full.toml")
+    Path(recipe).write_text(text, encoding="utf-8")
+    told = refused("run", recipe, "--direct", "--archive", root, "--units", "U1")
+    assert "key 'prior.full': full measures adxl355 with a prior" in told

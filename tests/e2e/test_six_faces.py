@@ -13,17 +13,8 @@ pytestmark = pytest.mark.usefixtures("home", "no_next_measurement")
 
 FACES = np.array([sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)])
 POSES = ",".join(f"dwell {k}={face}" for k, face in enumerate(("+x", "-x", "+y", "-y", "+z", "-z")))
-MAPPED = (
-    "--map",
-    "time=time_s,x=x,y=y,z=z",
-    "--unit-of",
-    "output=g,time=s",
-    "--units",
-    "S1",
-    "--set",
-    "local_gravity_m_s2=9.80665",
-)
-FIT = (*MAPPED, "--set", f"poses={POSES}", "--fit", "faces")
+MAPPED = ("--map", "time=time_s,x=x,y=y,z=z", "--unit-of", "output=g,time=s", "--units", "S1")
+FIT = (*MAPPED, "--set", "local_gravity_m_s2=9.80665", "--set", f"poses={POSES}", "--fit", "faces")
 
 
 def recorded(rng: np.random.Generator, path: str, *, tilt_deg: float = 0.0, moves: bool = True) -> str:
@@ -40,19 +31,12 @@ def recorded(rng: np.random.Generator, path: str, *, tilt_deg: float = 0.0, move
     return path
 
 
-def test_the_uncertainty_of_six_faces_is_that_of_every_fit(rng: np.random.Generator) -> None:
-    document = document_of("import", recorded(rng, "six.csv"), *FIT, status=1)
-    run = Archive(None).run(document["run"])
-    kept, again = run.table("coefficients"), fit(run.table("dwells"), None, MODEL)["coefficients"]
-    pd.testing.assert_frame_equal(kept, again)
-    stated = document["least_squares"]["bias_u"]
-    assert kept.query("effect == 'bias'")["standard_error"].tolist() == pytest.approx(stated)
-    assert min(stated) > 0.9 * 3e-4 / np.sqrt(6 * 225)  # the noise of the samples, which two residuals may hide
-    assert all(f"± {2.0 * u:.2g} g (k = 2;" in line for u, line in zip(stated, document["lines"], strict=False))
-
-
 @pytest.mark.parametrize(("tilt_deg", "adequate"), [(0.0, None), (0.6, False)])
-def test_six_faces_have_one_verdict(rng: np.random.Generator, tilt_deg: float, adequate: bool | None) -> None:  # noqa: FBT001
+def test_six_faces_have_one_verdict_and_one_uncertainty(
+    rng: np.random.Generator,
+    tilt_deg: float,
+    adequate: bool | None,  # noqa: FBT001
+) -> None:
     """No lack of fit of six faces shows adequacy; one beyond the noise of the samples is "not adequate"."""
     path = recorded(rng, "six.csv", tilt_deg=tilt_deg)
     imported = document_of("import", path, *FIT, status=1)
@@ -63,9 +47,15 @@ def test_six_faces_have_one_verdict(rng: np.random.Generator, tilt_deg: float, a
     assert len({one["reason"] for one in judged}) == 1
     assert len({one["error"]["p_value"] for one in judged}) == 1
     assert ("disagree by more than their samples allow" in judged[0]["reason"]) == (adequate is False)
-    assert set(Archive(None).run(imported["run"]).table("verdict")["verdict"]) == {
-        "not judged" if adequate is None else "not adequate"
-    }
+    run = Archive(None).run(imported["run"])
+    assert set(run.table("verdict")["verdict"]) == {"not judged" if adequate is None else "not adequate"}
+    # the uncertainty is that of every fit
+    kept, again = run.table("coefficients"), fit(run.table("dwells"), None, MODEL)["coefficients"]
+    pd.testing.assert_frame_equal(kept, again)
+    stated = imported["least_squares"]["bias_u"]
+    assert kept.query("effect == 'bias'")["standard_error"].tolist() == pytest.approx(stated)
+    assert min(stated) > 0.9 * 3e-4 / np.sqrt(6 * 225)  # the noise of the samples, which two residuals may hide
+    assert all(f"± {2.0 * u:.2g} g (k = 2;" in line for u, line in zip(stated, imported["lines"], strict=False))
 
 
 @pytest.mark.parametrize("moves", [True, False])

@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pytest
-from each import each
 from inquiries import job_of
 from small_station import MemorySink, captured, lot_of, short_recipe, station_of
 
@@ -21,17 +20,6 @@ from pipelines.schedule.timing import StationPose, minutes
 from schemas.poses import Pose, SoakPart
 from schemas.recipe import Recipe
 from stations.opening import open_station
-
-
-def in_parts(*parts: SoakPart) -> Recipe:
-    soaks = {"soaks": [p.model_dump() for p in parts], "temperatures_C": [p.temperature_C for p in parts]}
-    return Recipe.model_validate({**short_recipe(3).model_dump(), "verification": [], **soaks})
-
-
-def test_refuses_waits_that_are_not_as_many_as_the_poses():
-    with pytest.raises(ValueError, match="soak 1 has 2 waits for 3 poses"):
-        in_parts(SoakPart(temperature_C=23.0, waits_s=[1.0, 2.0]))
-
 
 LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of station time left(?:, about [^,]+ here)?$")
 
@@ -88,6 +76,9 @@ def test_the_time_that_is_left_is_right_within_a_tenth_after_the_first_soak(temp
     assert len(judged) > 50
     worst = max(abs(left - true) / true for _, left, true in judged)
     assert worst < 0.10
+    soaking = [left for _, left, note in told if f"soak at {temperatures[1]:g}" in note]
+    assert len(soaking) > 50
+    assert all(b <= a for a, b in itertools.pairwise(soaking))  # it never runs up within a soak
 
 
 def test_a_station_that_is_slower_than_its_file_says_teaches_by_its_first_soak_and_records():
@@ -99,13 +90,6 @@ def test_a_station_that_is_slower_than_its_file_says_teaches_by_its_first_soak_a
     first_error = abs(told[0][1] - end) / end
     assert first_error > 0.12  # before the first soak nobody can know
     assert max(abs(left - true) / true for left, true in judged) < 0.10
-
-
-def test_the_time_left_never_runs_up_within_a_soak():
-    told, *_ = told_and_true(short_recipe(poses=2, temperatures=(25.0, 60.0)), station_of())
-    soaking = [left for _, left, note in told if "soak at 60" in note]
-    assert len(soaking) > 50
-    assert all(b <= a for a, b in itertools.pairwise(soaking))
 
 
 def test_a_resumed_run_counts_only_what_is_left_and_far_moves_count_for_more():
@@ -133,7 +117,7 @@ def test_the_time_by_the_wall_clock_is_in_proportion_to_the_records_that_are_lef
     assert left.text(plan[2], 0.0).endswith(" here")
 
 
-def test_parts_of_the_planned_time_are_told_apart():
+def test_parts_of_the_planned_time_are_told_apart_with_the_pace_of_the_file_and_waits_are_as_many_as_poses():
     recipe = short_recipe(2, static_s=120.0)
     planned = minutes(steps(recipe), station_of(), recipe)
     assert planned.static_record == pytest.approx(2.0)
@@ -144,13 +128,13 @@ def test_parts_of_the_planned_time_are_told_apart():
     soaked = minutes([first], station_of(), recipe, standing)  # it only moves and dwells
     assert soaked.soaks == 0.0
     assert soaked.dwells > 0.0
-
-
-def test_hardware_takes_its_pace_from_the_stations_file():
     recipe = short_recipe(1, temperatures=(60.0,))
-    config = station_of().model_copy(update={"simulation": None})
+    config = station_of().model_copy(update={"simulation": None})  # hardware takes its pace from the station's file
     fast = config.model_copy(update={"pace": config.pace.model_copy(update={"ramp_K_per_min": 10.0, "lag_s": 60.0})})
     assert minutes(steps(recipe), fast, recipe).soaks < minutes(steps(recipe), config, recipe).soaks
+    soak = {"temperature_C": 25.0, "poses": [1], "verification": [], "waits_s": [1.0, 2.0]}
+    with pytest.raises(ValueError, match="soak 1 has 2 waits for 1 poses"):
+        Recipe.model_validate({**short_recipe(1).model_dump(), "soaks": [soak]})
 
 
 def ordered_recipe():
@@ -164,14 +148,9 @@ def ordered_recipe():
     return recipe.model_copy(update={"soaks": soaks, "temperatures_C": [s.temperature_C for s in soaks]})
 
 
-def small_steps():
-    """A recipe of soaks that are hardly apart."""
-    return short_recipe(4, static_s=60.0, temperatures=(10.0, 15.0, 20.0, 15.0, 10.0))
-
-
-@each([small_steps, ordered_recipe])
-def test_small_steps_waits_readings_on_the_way_and_pauses_without_power_take_the_minutes_that_are_planned(made):
-    planned_as_taken(made(), station_of(), *told_and_true(made(), station_of())[1:])
+def test_small_steps_waits_readings_on_the_way_and_pauses_without_power_take_the_minutes_that_are_planned():
+    for recipe in (short_recipe(4, static_s=60.0, temperatures=(10.0, 15.0, 20.0, 15.0, 10.0)), ordered_recipe()):
+        planned_as_taken(recipe, station_of(), *told_and_true(recipe, station_of())[1:])
 
 
 def test_devices_read_on_the_way_are_planned_at_the_temperatures_they_have_there():

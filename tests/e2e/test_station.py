@@ -69,11 +69,8 @@ def test_captured_tables_keep_their_contracts_and_have_every_record_in_order(who
     one = samples.query("record == 0 and unit == 'U001'")["time_s"]
     assert one.diff().dropna().to_numpy() == pytest.approx(0.01, abs=1e-9)
     assert one.iloc[0] == pytest.approx(readings.loc[0, "start_s"] + 0.01)
-
-
-def test_devices_feel_gravity_where_the_encoders_say(whole: MemorySink) -> None:
-    means = whole.all(0).groupby(["record", "unit"])[["x", "y", "z"]].mean() / 256000.0
-    for row in whole.all(1).itertuples():
+    means = samples.groupby(["record", "unit"])[["x", "y", "z"]].mean() / 256000.0
+    for row in readings.itertuples():  # devices feel gravity where the encoders say
         force = force_from_angles(row.outer_deg * 0.017453292519943295, row.inner_deg * 0.017453292519943295)
         # uncalibrated: bias of some 10 mg, scale and misalignment of some parts in a thousand
         assert means.loc[(row.record, row.unit)].to_numpy() == pytest.approx(force, abs=0.06)
@@ -90,8 +87,10 @@ def test_soaks_bring_every_unit_to_its_temperature_and_history_tells_how(whole: 
     assert history["unit_C"].min() < 24.0
 
 
-def test_a_second_run_gives_the_same_bytes_and_another_repeat_new_noise_of_the_same_devices(whole: MemorySink) -> None:
-    same(whole, captured(RECIPE))
+def test_a_killed_run_goes_on_bit_for_bit_and_another_repeat_has_new_noise_of_the_same_devices(
+    whole: MemorySink,
+) -> None:
+    same(whole, killed_and_resumed(RECIPE, 3))
     again = captured(short_recipe(poses=2), lot_of(repeat=1))
     first, fresh = (s.all(0).query("record == 0 and unit == 'U000'")["x"].to_numpy() for s in (whole, again))
     assert (first != fresh).any()
@@ -106,10 +105,6 @@ def killed_and_resumed(recipe: Recipe, records: int, config: StationConfig | Non
     assert len(sink.records) == records
     sink.die_after = 10**6
     return captured(recipe, sink=sink, config=config)
-
-
-def test_a_killed_run_goes_on_bit_for_bit(whole: MemorySink) -> None:
-    same(whole, killed_and_resumed(RECIPE, 3))
 
 
 @pytest.mark.slow
@@ -257,23 +252,24 @@ def test_a_safe_temperature_that_the_station_may_not_reach_is_refused() -> None:
     assert StationConfig.model_validate(content).safety.chamber == "off"
 
 
-@each([("off", "off", 60.0), ("hold", "automatic", 60.0), ("set_point", "automatic", 25.0)], repr)
-def test_the_safe_state_is_the_one_of_the_file(case: tuple[str, str, float]) -> None:
-    chamber, mode, set_point = case
-    config = station_of()
-    config = config.model_copy(update={"safety": config.safety.model_copy(update={"chamber": chamber})})
-    with open_station(config, lot_of(1)) as station:
-        station.chamber.set_temperature(60.0)
-        station.reader.start(100.0)
-        station.table.axes["outer"].start(90.0)
-        reached = station.make_safe()
-        assert reached.safe, reached.sentence()
-        assert (station.chamber.mode(), station.chamber.set_point()) == (mode, set_point)
-        assert station.reader.sampling() == "stopped"
-        assert not station.table.axes["outer"].moving()
-
-
-def test_a_part_that_does_not_answer_does_not_keep_the_others_from_being_safe() -> None:
+def test_the_safe_state_is_the_one_of_the_file() -> None:
+    for chamber, mode, set_point in (
+        ("off", "off", 60.0),
+        ("hold", "automatic", 60.0),
+        ("set_point", "automatic", 25.0),
+    ):
+        config = station_of()
+        config = config.model_copy(update={"safety": config.safety.model_copy(update={"chamber": chamber})})
+        with open_station(config, lot_of(1)) as station:
+            station.chamber.set_temperature(60.0)
+            station.reader.start(100.0)
+            station.table.axes["outer"].start(90.0)
+            reached = station.make_safe()
+            assert reached.safe, reached.sentence()
+            assert (station.chamber.mode(), station.chamber.set_point()) == (mode, set_point)
+            assert station.reader.sampling() == "stopped"
+            assert not station.table.axes["outer"].moving()
+    # a part that does not answer does not keep the others from it
     with open_station(station_of(faults=[{"kind": "silent", "device": "outer"}]), lot_of(1)) as station:
         reached = station.make_safe()
         assert list(reached.failed) == ["outer axis stopped"]
@@ -341,20 +337,19 @@ def test_a_client_of_another_maker_reads_what_the_profiles_say() -> None:
         assert mbpoll(port, 10, 0, "4")[0] == "8"
 
 
-two_processors = pytest.mark.skipif(
-    not hasattr(os, "sched_setaffinity") or len(os.sched_getaffinity(0)) < 2, reason="needs two processors"
-)
-
-
 @pytest.fixture
 def claims(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Claims of processors that tests beside this one do not see."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
-@two_processors
+@pytest.mark.skipif(
+    not hasattr(os, "sched_setaffinity") or len(os.sched_getaffinity(0)) < 2, reason="needs two processors"
+)
 @pytest.mark.usefixtures("claims")
-def test_stations_have_different_processors_with_their_threads_and_one_too_many_has_all() -> None:
+def test_stations_have_different_processors_with_their_threads_and_one_too_many_has_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     every = os.sched_getaffinity(0)
     taken: list[set[int]] = []
     inside, leave = threading.Semaphore(0), threading.Event()
@@ -380,14 +375,9 @@ def test_stations_have_different_processors_with_their_threads_and_one_too_many_
         thread.join()
     assert [len(own) for own in taken] == [1] * len(every) + [len(every)]
     assert set.union(*taken[:-1]) == every
-
-
-@two_processors
-def test_without_a_place_for_its_claim_nothing_changes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", "/proc/none")
-    before = os.sched_getaffinity(0)
     with one_processor():
-        assert os.sched_getaffinity(0) == before
+        assert os.sched_getaffinity(0) == every  # without a place for its claim nothing changes
 
 
 @pytest.mark.usefixtures("claims")

@@ -104,17 +104,14 @@ def failed(folder: Path, units: int = 1, **self_test: object) -> list[str]:
     return checked("--station", path, "--slots", str(units), status=3)["failed"]
 
 
-def test_a_slot_noisier_than_its_neighbours_is_named(tmp_path):
-    assert [message.split(":")[0] for message in failed(tmp_path, 2, noise_max=50.0)] == ["slot 0", "slot 1"]
-
-
-def test_the_check_standard_is_held_against_the_limits_of_the_file(tmp_path):
+def test_noise_and_the_check_standard_are_held_against_the_limits_of_the_file(tmp_path):
     good = changed(tmp_path, self_test={"standard": "SIM0000", "scale": [250e3, 262e3], "offset": [-12e3, 12e3]})
     document = checked("--station", good, "--slots", "2")
     scale = next(finding for finding in document["checks"] if finding["check"] == "scale")
     assert (scale["value"], scale["unit"]) == (pytest.approx(256e3, rel=0.02), "LSB/g")
     (message,) = failed(tmp_path, 2, standard="SIM0000", scale=[1.0, 2.0])[:1]
     assert message.startswith("standard SIM0000: scale 25")
+    assert [message.split(":")[0] for message in failed(tmp_path, 2, noise_max=50.0)] == ["slot 0", "slot 1"]
     assert failed(tmp_path, standard="CS-1") == [
         "slots: check standard CS-1 is in no slot; insert it, or correct [self_test]"
     ]
@@ -182,7 +179,4 @@ def test_a_chart_goes_from_corner_to_corner():
     assert min(drawn[-1]) == 0
     assert max(drawn[0]) == len(rows[0].split("│")[1]) - 1
     assert all(min(above) > min(below) for above, below in itertools.pairwise(drawn))
-
-
-def test_a_chart_of_nothing_says_so():
     assert "no data yet" in chart("°C", [Line("air", "red", [(0.0, math.nan)])], 50, 8, (0.0, 1.0)).plain

@@ -1,7 +1,4 @@
-"""Every example of every ``--help`` is given as it is printed, in a folder that has the files which it names.
-
-It ends with a result or a verdict; the few that end otherwise here say why in one sentence, which is stated in ``OTHERWISE``.
-"""
+"""Every example of every ``--help`` is given as it is printed, in a folder that has the files which it names."""
 
 import io
 import os

@@ -82,7 +82,7 @@ def corrupted(data: bytes) -> bytes:
     return data[:-3] + bytes([data[-3] ^ 0x10]) + data[-2:]
 
 
-def test_a_serial_answer_with_a_wrong_check_is_asked_for_again_and_never_believed():
+def test_a_serial_answer_with_a_wrong_check_or_more_behind_it_is_asked_for_again_and_never_believed():
     with on_a_serial_line() as (_, line, station):
         station.chamber.temperature()
         line.to_host.append(corrupted)
@@ -91,6 +91,10 @@ def test_a_serial_answer_with_a_wrong_check_is_asked_for_again_and_never_believe
         line.to_host += [corrupted, lambda data: data, corrupted]
         with pytest.raises(LinkLost, match=r"no valid answer to 'read chamber temperature .* \(CRC "):
             station.chamber.temperature()
+    with on_a_serial_line(**ONCE) as (_, line, station):
+        line.to_host.append(lambda data: data + data)
+        with pytest.raises(LinkLost, match="bytes after"):
+            station.chamber.set_point()
 
 
 def test_a_serial_answer_that_comes_late_is_heard_out_before_the_next_question(monkeypatch):
@@ -128,13 +132,6 @@ def test_a_serial_answer_that_comes_after_two_time_outs_is_not_believed(knows_ec
         assert station.chamber.set_point() == 50.0
 
 
-def test_a_serial_answer_with_more_behind_it_is_not_believed():
-    with on_a_serial_line(**ONCE) as (_, line, station):
-        line.to_host.append(lambda data: data + data)
-        with pytest.raises(LinkLost, match="bytes after"):
-            station.chamber.set_point()
-
-
 def test_a_line_that_nobody_answers_on_costs_one_time_out_an_attempt(monkeypatch):
     waited, read = [], serial_wire.Serial.read
 
@@ -152,12 +149,6 @@ def test_a_line_that_nobody_answers_on_costs_one_time_out_an_attempt(monkeypatch
     assert len(waited) == 1
     assert 0.0 < waited[0] <= 0.2
     assert line.heard
-
-
-def test_a_terminal_that_is_not_there_is_told_by_name():
-    real = hardware(station_with(), link="rtu", serial="/dev/none", baud=19200)
-    with open_devices(real, ()) as station, pytest.raises(LinkLost, match="/dev/none"):
-        station.chamber.temperature()
 
 
 @pytest.fixture
@@ -199,16 +190,16 @@ def test_who_is_not_who_he_says_is_not_believed_by_either_side(secured, tmp_path
         pass
 
 
-def test_settings_that_a_line_cannot_have_are_told_or_taken():
+def test_lines_settings_and_carriers_that_cannot_be_are_told_by_name(tmp_path):
+    nowhere = hardware(station_with(), link="rtu", serial="/dev/none", baud=19200)
+    with open_devices(nowhere, ()) as station, pytest.raises(LinkLost, match="/dev/none"):
+        station.chamber.temperature()
     # pseudo-terminals know no parity on some kernels: whatever they do, it is an answer by name
     once = {"read_attempts": 1, "timeout_s": 0.1}
     with serial_line() as line:
         real = hardware(station_with(), once, link="rtu", serial=line.host, baud=19200, parity="even")
         with open_devices(real, ()) as station, pytest.raises((LinkLost, StationTimeout), match=line.host):
             station.chamber.temperature()
-
-
-def test_a_device_that_has_no_tls_is_not_asked_for_it(tmp_path):
     where = {"link": "tls", "host": "127.0.0.1", "port": 1, "ca_file": str(Authority(tmp_path).file)}
     real = hardware(station_with(chamber="espec_p300"), **where)
     with pytest.raises(RecipeInvalid, match="is carried by ascii"), open_devices(real, ()):

@@ -55,16 +55,13 @@ def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybod
             assert one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth") <= 0, path
         assert one.outside == []
         assert one.errors == []
-
-
-def test_the_browser_of_these_tests_reaches_nothing_outside_and_notes_what_is_asked_for(
-    bench: Served, browser: Any
-) -> None:
-    with tab(browser, bench.address) as one:
-        for place in ("http://192.0.2.1/", "http://example.org/"):
+        for place in ("http://192.0.2.1/", "http://example.org/"):  # the check of what is outside finds what it is for
             with pytest.raises(Exception, match="ERR_PROXY_CONNECTION_FAILED"):
                 one.page.goto(place)
         assert one.outside == ["http://192.0.2.1/", "http://example.org/"]
+    with tab(browser, bench.address, token=False) as one:  # who has no token may look and not compute
+        one.page.goto(f"{bench.address}/missing?source=latest")
+        until(lambda: "has read access only" in one.page.inner_text("main"), "the page says why nothing begins")
 
 
 @pytest.mark.slow  # what may be released: tests/unit/pipelines/rerun/test_whatif.py
@@ -181,12 +178,6 @@ def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, bro
         one.ready()
         one.sees("[data-name='samples'][data-drawn]")
         assert one.errors == []
-
-
-def test_a_browser_without_the_token_may_look_and_not_compute(bench: Served, browser: Any) -> None:
-    with tab(browser, bench.address, token=False) as one:
-        one.page.goto(f"{bench.address}/missing?source=latest")
-        until(lambda: "has read access only" in one.page.inner_text("main"), "the page says why nothing begins")
 
 
 @pytest.mark.slow

@@ -11,18 +11,9 @@ from in_process import text_of
 
 PHONE, SCREEN = (390, 844), (1440, 900)
 PAGES = (
-    "/units",
-    "/run",
-    "/unit",
-    "/missing",
-    "/two-models",
-    "/upload",
-    "/operator",
-    "/models",
-    "/plan?only=unseen",
-    "/station",
+    "/units", "/run", "/unit", "/missing", "/two-models", "/upload", "/operator", "/models", "/plan?only=unseen", "/station",
     "/audit",
-)
+)  # fmt: skip
 OUTSIDE = """() => [...document.querySelectorAll("main *, header *")]
     .filter((e) => e.checkVisibility() && !e.closest(".scroll, svg, .hidden, .skip"))
     .filter((e) => e.getBoundingClientRect().right > innerWidth + 1)

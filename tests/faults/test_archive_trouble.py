@@ -185,18 +185,8 @@ def test_what_was_measured_with_an_overdue_standard_is_not_certified(tmp_path: P
         certify(Ledger(runner.run.archive), runner.run)
 
 
-def test_a_run_that_was_cut_off_tells_how_to_go_on_everywhere(root: Path) -> None:
+def test_a_run_json_that_was_lost_hides_no_other_run_and_a_run_that_was_cut_off_tells_how_to_go_on(root: Path) -> None:
     run = Archive(root).run("latest")
-    for name in ("grades", "figures", "report", "sealed"):
-        for path in run.path.glob(f"{name}.*"):
-            path.unlink()
-    assert "to continue" in given("show", "latest", "--archive", root)[1]
-    for words in (("certificate", "issue", "latest"), ("show", "latest", "--report")):
-        status, _, message = given(*words, "--archive", root)
-        assert (status, "not finished" in message) == (2, True)
-
-
-def test_a_run_json_that_was_lost_hides_no_other_run(root: Path) -> None:
     (root / "runs" / "empty").mkdir()
     (root / "runs" / "lost").mkdir()
     (root / "runs" / "lost" / "dwells.json").write_text("{}", encoding="utf-8")
@@ -207,9 +197,16 @@ def test_a_run_json_that_was_lost_hides_no_other_run(root: Path) -> None:
     told_of = json.loads(given("verify", "--json", "--archive", root)[1])
     assert [(f["kind"], f["path"]) for f in told_of["findings"]] == [("missing", "runs/lost/run.json")]
     assert told_of["remarks"] == ["runs/empty holds no run: its writer was killed, or has just started"]
+    for name in ("grades", "figures", "report", "sealed"):
+        for path in run.path.glob(f"{name}.*"):
+            path.unlink()
+    assert "to continue" in given("show", run.id, "--archive", root)[1]
+    for words in (("certificate", "issue", run.id), ("show", run.id, "--report")):
+        status, _, message = given(*words, "--archive", root)
+        assert (status, "not finished" in message) == (2, True)
 
 
-def test_a_finished_run_that_lost_a_table_is_not_taken_for_an_unfinished_one(root: Path) -> None:
+def test_a_finished_run_that_lost_a_table_or_whose_table_has_changed_is_told_as_such(root: Path) -> None:
     run = Archive(root).run("latest")
     for name in ("grades", "verdict"):
         place = run.path / f"{name}.parquet"
@@ -223,10 +220,6 @@ def test_a_finished_run_that_lost_a_table_is_not_taken_for_an_unfinished_one(roo
             refused(f"run {run.id} is finished, and {name}.parquet of it is not there", *words, "--archive", root)
         assert given("show", "latest", "figures", "--archive", root)[0] == 0
         place.write_bytes(data)
-
-
-def test_show_says_that_a_table_of_the_result_has_changed(root: Path) -> None:
-    run = Archive(root).run("latest")
     for name in ("coefficients", "covariance"):
         place = run.path / f"{name}.parquet"
         data = place.read_bytes()
@@ -238,14 +231,7 @@ def test_show_says_that_a_table_of_the_result_has_changed(root: Path) -> None:
         place.write_bytes(data)
 
 
-def test_a_place_without_an_archive_is_not_an_archive_without_runs(tmp_path: Path) -> None:
-    (tmp_path / "other").mkdir()
-    for place in (tmp_path / "other", tmp_path / "none"):
-        for command in ("list", "audit", "verify", "discover"):
-            refused("holds no archive, one with runs is needed", command, "--archive", place)
-
-
-def test_a_name_that_no_run_has_is_answered_with_few_names(tmp_path: Path) -> None:
+def test_a_name_that_no_run_has_and_a_place_without_an_archive_are_told(tmp_path: Path) -> None:
     store = Archive(tmp_path / "archive")
     for n in range(60):
         store.open_run("lot", {"lot": {"units": []}}, n)
@@ -254,3 +240,7 @@ def test_a_name_that_no_run_has_is_answered_with_few_names(tmp_path: Path) -> No
         _, _, message = given("show", name, "--archive", store.root)
         assert message.count("lot-") == 5, message
         assert "and 55 more" in message
+    (tmp_path / "other").mkdir()
+    for place in (tmp_path / "other", tmp_path / "none"):
+        for command in ("list", "audit", "verify", "discover"):
+            refused("holds no archive, one with runs is needed", command, "--archive", place)

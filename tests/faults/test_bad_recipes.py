@@ -57,11 +57,8 @@ def test_nesting_and_long_integers_end_in_one_message_everywhere(tmp_path: Path)
     for text in ("[" * 100_000, '{"a": ' * 100_000, f'{{"a": {"1" * 9999}}}'):
         with pytest.raises(ArchiveUnusable, match="not a manifest"):
             archive_files.parsed(text.encode(), tmp_path / "m.json")
-
-
-def test_a_mark_at_the_beginning_of_a_file_is_read_over(tmp_path: Path) -> None:
     (tmp_path / "r.toml").write_bytes(b"\xef\xbb\xbf" + RECIPE.read_bytes())
-    assert load_recipe(str(tmp_path / "r.toml")).name == "production"
+    assert load_recipe(str(tmp_path / "r.toml")).name == "production"  # a mark at the beginning is read over
 
 
 def test_each_scan_is_checked_when_it_is_scanned() -> None:

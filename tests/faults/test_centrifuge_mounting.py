@@ -61,6 +61,10 @@ def test_units_are_mounted_at_standstill_with_the_interlock_open(machine, monkey
     assert at.index(":int:open 1") < at.index(":mount 1,-1")
     with pytest.raises(StationRefused, match="NA:PARA ERR"):
         machine.values.write("radius", 0.5)  # it turns
+    heard.clear()
+    without_radius(monkeypatch, type(machine.values))  # a machine that has no command for it is not told
+    machine.spin(400.0, 1, 0.5, [0, 1], 0.3)
+    assert not any("radius" in line for line, _ in heard)
 
 
 def test_the_units_feel_the_acceleration_of_the_radius_that_was_ordered(machine) -> None:
@@ -90,13 +94,6 @@ def without_radius(monkeypatch: pytest.MonkeyPatch, of: type) -> None:
     """A machine that cannot be told the radius."""
     has = of.has
     monkeypatch.setattr(of, "has", lambda self, name: name != "radius" and has(self, name))
-
-
-def test_a_device_without_a_command_for_the_radius_is_not_told(machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    heard = orders(monkeypatch)
-    without_radius(monkeypatch, type(machine.values))
-    machine.spin(400.0, 1, 0.5, [0, 1], 0.3)
-    assert not any("radius" in line for line, _ in heard)
 
 
 HEAD = (

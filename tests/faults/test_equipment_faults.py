@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from each import each
 from long_suites import mostly_slow
 
 from pipelines.archive import Archive, Run
@@ -103,30 +104,23 @@ def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_
     assert {"shock": "shock", "step_response": "step generator"}.get(name, "exciter") in events[0].reason
 
 
-@pytest.mark.parametrize(
-    ("name", "kind", "text"),
-    [
-        ("sweep", "missed_trigger", "trigger was missed"),
-        ("sweep", "controller_abort", "interlock open"),
-        ("shock", "guard_door", "guard door is open"),
-        ("shock", "level_not_reached", "was ordered"),
-        ("centrifuge", "guard_door", "guard door"),
-        ("centrifuge", "overspeed", "overspeed"),
-        ("centrifuge", "drive_runaway", "runs away"),
-        ("centrifuge", "missed_trigger", "trigger was missed"),
-        ("step_response", "missed_trigger", "trigger was missed"),
-        ("step_response", "level_not_reached", "was ordered"),
-        ("step_response", "controller_abort", "amplifier reports a fault"),
-        ("ratiometry", "current_limit", "V measured, 13 V was set"),
-        ("transverse", "controller_abort", "interlock open"),
-        ("random_vibration", "controller_abort", "interlock open"),
-        ("random_vibration", "reference_cable_off", "was ordered"),
-        ("shock", "reference_cable_off", "was ordered"),
-    ],
-)
-def test_trouble_that_stays_ends_the_run_for_a_person(name: str, kind: str, text: str, tmp_path: Path) -> None:
-    with pytest.raises(OperatorNeeded, match=text):
-        take(tmp_path, name, [FaultOrder(kind=kind)], "bad")
+TROUBLE = {
+    ("sweep", "missed_trigger"): "trigger was missed", ("sweep", "controller_abort"): "interlock open",
+    ("shock", "guard_door"): "guard door is open", ("shock", "level_not_reached"): "was ordered",
+    ("centrifuge", "guard_door"): "guard door", ("centrifuge", "overspeed"): "overspeed",
+    ("centrifuge", "drive_runaway"): "runs away", ("centrifuge", "missed_trigger"): "trigger was missed",
+    ("step_response", "missed_trigger"): "trigger was missed", ("step_response", "level_not_reached"): "was ordered",
+    ("step_response", "controller_abort"): "amplifier reports a fault",
+    ("ratiometry", "current_limit"): "V measured, 13 V was set", ("transverse", "controller_abort"): "interlock open",
+    ("random_vibration", "controller_abort"): "interlock open", ("random_vibration", "reference_cable_off"): "was ordered",
+    ("shock", "reference_cable_off"): "was ordered",
+}  # fmt: skip
+
+
+@each(TROUBLE)
+def test_trouble_that_stays_ends_the_run_for_a_person(case: tuple[str, str], tmp_path: Path) -> None:
+    with pytest.raises(OperatorNeeded, match=TROUBLE[case]):
+        take(tmp_path, case[0], [FaultOrder(kind=case[1])], "bad")
 
 
 FIGURE = {

@@ -18,16 +18,9 @@ from stations.profile_files import load_profile
 
 TIMEOUT_S = 0.08
 ACTIONS = [
-    WireAction("drop"),
-    WireAction("drop"),
-    WireAction("delay", delay_s=2.0 * TIMEOUT_S),
-    WireAction("delay", delay_s=0.2 * TIMEOUT_S),
-    WireAction("duplicate"),
-    WireAction("late"),
-    WireAction("retag"),
+    *map(WireAction, ("drop", "drop", "duplicate", "late", "retag", "reset", "half_open")),
+    *(WireAction("delay", delay_s=part * TIMEOUT_S) for part in (2.0, 0.2)),
     WireAction("truncate", size=3),
-    WireAction("reset"),
-    WireAction("half_open"),
     WireAction("drop", "request"),
 ]
 WRITES = {5, 15, 16}

@@ -56,8 +56,12 @@ def ends_as_the_matrix_says(case: Case) -> None:
     assert row(case, result) in PAGE.read_text(encoding="utf-8"), "write the page again: python tests/fault_matrix.py"
 
 
-def test_every_kind_is_in_the_matrix_and_the_page_is_of_these_cases() -> None:
+def test_every_kind_is_described_and_in_the_matrix_and_the_page_is_of_these_cases() -> None:
     """Faults of test equipment and of a device's memory have tests of their own."""
+    for name, kind in kinds().items():
+        assert set(kind.targets) <= {UNIT_TARGET, *DEVICES}, name
+        assert kind.meaning.endswith("."), name
+        assert all(isinstance(value, float) for value in kind.figures.values()), name
     shown = {case.kind for case in CASES}
     assert shown <= set(kinds())
     of_memory = {name for name in kinds() if name.startswith("memory_") and name not in shown}
@@ -74,11 +78,3 @@ def test_every_kind_is_in_the_matrix_and_the_page_is_of_these_cases() -> None:
 def test_a_sound_station_is_true_to_the_last_dwell() -> None:
     result = run_case(Case("vibration:rms_g=0", RECOVERED))
     assert (result.outcome, result.bad, result.spoilt) == (RECOVERED, [], [])
-
-
-@pytest.mark.parametrize("name", kinds())
-def test_every_kind_has_a_description_known_targets_and_figures_with_defaults(name: str) -> None:
-    kind = kinds()[name]
-    assert set(kind.targets) <= {UNIT_TARGET, *DEVICES}
-    assert kind.meaning.endswith(".")
-    assert all(isinstance(value, float) for value in kind.figures.values())

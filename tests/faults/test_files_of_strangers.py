@@ -17,7 +17,7 @@ from root_process import ROOT
 
 from pipelines.importers import files, limited
 from pipelines.importers.limited import MIB, ReadingLimits, in_reader
-from schemas.errors import DataRejected, WrongUse
+from schemas.errors import DataRejected
 
 FEW = ReadingLimits(256 * MIB, 1, 20)
 
@@ -111,7 +111,10 @@ def test_a_reader_has_the_memory_of_its_limit_and_no_more() -> None:
     assert in_tests(takes_memory, 100) == 100 * MIB
 
 
-def test_one_reader_reads_at_a_time_and_the_same_process_reads_the_next_file() -> None:
+def test_a_defect_of_a_reader_keeps_its_kind_and_place_and_one_process_reads_one_file_at_a_time() -> None:
+    with pytest.raises(ZeroDivisionError) as caught:
+        in_tests(divmod, 1, 0)
+    assert "limited_process" in "".join(caught.value.__notes__)
     found: list[int] = []
     threads = [threading.Thread(target=lambda: found.append(in_tests(of_its_process))) for _ in range(8)]
     for one in threads:
@@ -121,13 +124,7 @@ def test_one_reader_reads_at_a_time_and_the_same_process_reads_the_next_file() -
     assert len(set(found)) == 1
 
 
-def test_a_defect_of_a_reader_keeps_its_kind_and_its_place() -> None:
-    with pytest.raises(ZeroDivisionError) as caught:
-        in_tests(divmod, 1, 0)
-    assert "limited_process" in "".join(caught.value.__notes__)
-
-
-def test_a_recording_comes_back_as_its_reader_gave_it(tmp_path: Path) -> None:
+def test_a_recording_comes_back_as_its_reader_gave_it_and_a_pipe_is_read(tmp_path: Path) -> None:
     table = pd.DataFrame({"t": np.arange(500) / 100.0, "ax": 1, "text": "a", "m": pd.Timestamp("2026-01-01")})
     for name, write in (("a.csv", lambda p: table.to_csv(p, index=False)), ("a.parquet", table.to_parquet)):
         write(tmp_path / name)
@@ -135,16 +132,11 @@ def test_a_recording_comes_back_as_its_reader_gave_it(tmp_path: Path) -> None:
         pd.testing.assert_frame_equal(here[0].table, there[0].table)
         assert (here[0].remarks, here[1]) == (there[0].remarks, there[1])
         there[0].table.iloc[0, 0] = 5.0  # its arrays can be written
-
-
-def test_a_pipe_is_read_by_the_process_that_has_it(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")
+    os.mkfifo(tmp_path / "pipe")  # which is read by the process that has it
     writer = threading.Thread(target=lambda: (tmp_path / "pipe").write_text("t,x\n" + "1,2\n" * 20, encoding="utf-8"))
     writer.start()
     assert len(files.read(tmp_path / "pipe")[0]) == 20
     writer.join()
-    with pytest.raises(WrongUse, match="cannot be read"):
-        files.read(tmp_path / "missing.csv")
 
 
 @each([b"\n", b",\n", b"1,\n", b",,,,,,,,\n", b"1 1 1 1\n", b"1\n"])

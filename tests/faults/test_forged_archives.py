@@ -1,7 +1,4 @@
-"""Archives that somebody forged: what ``verify`` finds, and what ``certify``, ``export``, ``query`` and ``lineage`` do with them.
-
-One small archive of two runs, with certificates, is made once without a key and once with one; each forgery works on a copy.
-"""
+"""Archives that somebody forged: what ``verify`` finds, and what certificates, exports, queries and lineage do with them."""
 
 import json
 import shutil
@@ -349,6 +346,7 @@ def test_one_edited_file_gives_one_finding_with_its_consequences(root: Path) -> 
         place.write_bytes(files.json_bytes({**json.loads(data), "who": "somebody else"}))
         [finding] = verify(Archive(root), keys=public_keys()).checked.findings
         assert finding.path.endswith(f"/{name}.json")
+        assert finding.kind == ("signature" if public_keys() else "edited")
         assert len(finding.consequences) >= 2
         place.write_bytes(data)
     shutil.rmtree(runs(root)[0].path)
@@ -382,14 +380,9 @@ def test_query_and_audit_notice_an_edit_of_the_index_and_answer_from_the_runs(ro
         assert place in caplog.text
         assert "was edited since it was made" in caplog.text
         assert ask(Archive(root), question).rows == before
-
-
-@pytest.mark.parametrize("root", ["signed"], indirect=True)
-def test_an_edit_with_a_seal_to_match_is_noticed_where_a_key_is_configured(root: Path) -> None:
-    question = "SELECT sum(abs(value)) FROM coefficients"
-    before = ask(Archive(root), question).rows
-    an_edited_part_of_the_index_with_its_seal(root)
-    assert ask(Archive(root), question).rows == before
+    if public_keys():  # a seal to match is noticed where a key is configured
+        an_edited_part_of_the_index_with_its_seal(root)
+        assert ask(Archive(root), question).rows == before
 
 
 def test_noted_events_that_were_edited_are_read_again(root: Path, caplog) -> None:

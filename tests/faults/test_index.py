@@ -158,13 +158,10 @@ def test_a_part_without_one_of_its_tables_is_made_again_and_foreign_files_are_pa
     for name in TABLES:
         pq.write_table(pa.table({"a": [1]}), foreign / f"{name}.parquet")
     (archive.root / "index" / "note.txt").write_text("mine", encoding="utf-8")
-    assert rows(up_to_date(archive)) == whole
-
-
-def test_a_table_of_the_index_that_is_cut_off_is_told_with_what_to_do(archive: Archive) -> None:
     audit_index = up_to_date(archive)
+    assert rows(audit_index) == whole
     place = audit_index.parts[0] / "figures.parquet"
-    place.write_bytes(place.read_bytes()[:1000])
+    place.write_bytes(place.read_bytes()[:1000])  # one that is cut off is told with what to do
     with pytest.raises(ArchiveUnusable, match=r"index .* cannot be read .*; remove .*, it is made again"):
         audit_index.table("figures")
 

@@ -40,11 +40,6 @@ def test_questions_are_put_again_after_silence_and_orders_are_not():
         assert heard == [b"TEMP, S25.0\r\n"]
 
 
-def test_refusals_are_told_by_name():
-    with linked(b"NA:DATA OUT OF RANGE\r\n") as (link, _), pytest.raises(StationRefused, match="NA:DATA OUT OF RANGE"):
-        link.tell("TEMP, S999.0", "set point")
-
-
 @each([None, b"23.0\r\n40.0\r\n", b"\xff\xfe\r\n", b"x" * 3000])
 def test_what_is_not_one_line_is_no_answer(answer):
     with linked(answer, attempts=1) as (link, _), pytest.raises(LinkLost, match="connection lost at air 'TEMP\\?'"):
@@ -66,7 +61,9 @@ def test_a_late_answer_never_meets_the_next_question():
         assert link.ask("MODE?", "mode") == "25.0"  # on a connection of its own
 
 
-def test_nobody_there_is_told():
+def test_refusals_and_that_nobody_is_there_are_told():
+    with linked(b"NA:DATA OUT OF RANGE\r\n") as (link, _), pytest.raises(StationRefused, match="NA:DATA OUT OF RANGE"):
+        link.tell("TEMP, S999.0", "set point")
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     with pytest.raises(LinkLost, match="connection lost"):

@@ -106,9 +106,8 @@ def test_a_run_that_was_stopped_is_refused_with_the_way_on_and_shown_as_such(tmp
     for command, *option in (("show", "--report"), ("diagnose",), ("export",)):
         status, out, message = given(command, "latest", *option, "--archive", archive.root)
         assert (status, out) == (2, "")
-        assert re.search(
-            r"repeat its 'tumbleline run'|give (its|the) .*again|again (to continue|and it goes on)", message
-        )
+        way_on = r"repeat its 'tumbleline run'|give (its|the) .*again|again (to continue|and it goes on)"
+        assert re.search(way_on, message)
     status, out, _ = given("show", "latest", "--archive", archive.root)
     assert (status, "is not finished (7 records stored)" in out) == (0, True)
 
@@ -144,28 +143,18 @@ def test_ctrl_c_in_a_capture_says_that_it_goes_on_and_it_does(tmp_path: Path) ->
 
 
 def said(error: dict[str, float], group: dict, *units: str) -> str:
-    return verdict(
-        {
-            "adequate": False,
-            "error": error,
-            "blocked_by": [],
-            "units": [*units],
-            "unexplained": None,
-            "classes": [group],
-        }
-    )
+    document = {"adequate": False, "blocked_by": [], "unexplained": None}
+    return verdict({**document, "error": error, "units": [*units], "classes": [group]})
 
 
-@each([(432.0, True), (441.0, True), (882.0, False)])
-def test_an_error_below_the_noise_that_is_no_noise_is_said_to_be_small(row: tuple[float, bool]) -> None:
-    rms, told_so = row
+def test_an_error_below_the_noise_is_said_to_be_small_and_a_model_that_fits_beside_faulty_dwells_has_no_misfit() -> (
+    None
+):
     group = {"effects": ["scale_temperature_quadratic"], "scope": "sensor"}
-    text = said({"rms_ug": rms, "floor_ug": 441.0, "p_value": 4e-190}, group, "U1")
-    assert text.startswith("NOT ADEQUATE")
-    assert ("the misfit is smaller than the noise" in text) == told_so
-
-
-def test_a_model_that_fits_beside_faulty_dwells_has_no_misfit() -> None:
+    for rms, small in ((432.0, True), (441.0, True), (882.0, False)):
+        text = said({"rms_ug": rms, "floor_ug": 441.0, "p_value": 4e-190}, group, "U1")
+        assert text.startswith("NOT ADEQUATE")
+        assert ("the misfit is smaller than the noise" in text) == small
     group = {"effects": ["gain_step"], "scope": "data", "units": ["SN-2"], "dwells": [19]}
     text = said({"rms_ug": 24.6, "floor_ug": 28.9, "p_value": 0.74}, group, "SN-1", "SN-2")
     assert "misfit" not in text

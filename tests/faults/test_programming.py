@@ -92,6 +92,7 @@ def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
 
 
 def test_the_older_copy_is_written_and_the_other_is_kept(run: Run) -> None:
+    assert [unit.unit for _, unit in chosen_units(run, ["A1", "A1"])] == ["A1"]  # named twice, written once
     programmed(run, ("A1",))
     kept = copies(run)[0]
     done, _ = programmed(run, ("A1",), form="q24")
@@ -169,7 +170,7 @@ def calibration() -> UnitCalibration:
     return UnitCalibration("SN-1", "pass", "industrial", "LSB", bias, response, (-10.0, 60.0), ())
 
 
-def test_a_block_is_what_its_layout_says() -> None:
+def test_a_block_is_what_its_layout_says_and_a_memory_that_is_erased_or_damaged_holds_none() -> None:
     """Read by the table of the layout, not by the module that wrote it."""
     block = block_of(calibration(), "float32", sequence=7, certificate=3, date=20261122, offsets=(2, -1, 0), step=16)
     content = pack(block)
@@ -184,15 +185,11 @@ def test_a_block_is_what_its_layout_says() -> None:
     assert struct.unpack_from("<hhh", content, 104) == (2, -1, 0)
     assert struct.unpack_from("<3f", content, 112) == (5120.0 + 32.0, -2560.0 - 16.0, 100.0)
     assert struct.unpack_from("<I", content, 304)[0] == zlib.crc32(content[:304])
-
-
-def test_a_calibration_that_was_revoked_is_not_written(run: Run) -> None:
-    ledger = Ledger(run.archive.root)
-    certify(ledger, run, ["A1"])
-    ledger.revoke("A1", "fell to the floor", day=today())
-    with pytest.raises(WrongUse, match="fell to the floor"):
-        programmed(run, ("A1",))
-    assert programming(run.archive.root, "A1") == []
+    assert [unpack(data) for data in (b"\xff" * 384, b"\0" * 384, content[:200])] == [None] * 3
+    for place in (5, 20, 90, 150, 305):
+        spoilt = bytearray(content)
+        spoilt[place] ^= 0x10
+        assert unpack(bytes(spoilt)) is None
 
 
 def packed(form: Form) -> bytes:
@@ -207,16 +204,7 @@ def test_a_block_corrects_as_the_calibration(form: Form) -> None:
         np.testing.assert_allclose(block.correct(output, t), unit.correct(output, t), atol=5e-7)
 
 
-def test_an_erased_a_zero_and_a_damaged_memory_hold_no_block() -> None:
-    content = packed("float32")
-    assert [unpack(data) for data in (b"\xff" * 384, b"\0" * 384, content[:200])] == [None] * 3
-    for place in (5, 20, 90, 150, 305):
-        spoilt = bytearray(content)
-        spoilt[place] ^= 0x10
-        assert unpack(bytes(spoilt)) is None
-
-
-def test_a_lost_answer_is_decided_by_the_counter_and_the_command_is_sent_once(run: Run) -> None:
+def test_a_lost_answer_is_decided_by_the_counter_and_a_memory_that_samples_refuses(run: Run) -> None:
     small = job_of(run)
     plant = plant_of(run, small)
     with serve_plant(small.station, small.lot, plant) as station:
@@ -234,23 +222,17 @@ def test_a_lost_answer_is_decided_by_the_counter_and_the_command_is_sent_once(ru
         registers.write = lambda name, value: (_ for _ in ()).throw(StationTimeout("slot 0: no answer"))
         with pytest.raises(StationTimeout):
             UnitMemory(registers, station.clock).program("a", b"\x12\x34" * 100)
-    orders = [e for e in plant.journal.events() if getattr(e, "address", -1) == COMMAND]
-    assert len(orders) == 1
-    assert plant.flash[0].erases == [1, 0]
-    assert plant.flash[0].read(0, plant.now_us)[0] == 0x1234
-
-
-def test_a_memory_that_samples_or_has_no_power_refuses(run: Run) -> None:
-    small = job_of(run)
-    plant = plant_of(run, small)
-    with serve_plant(small.station, small.lot, plant) as station:
-        memory = station.reader.slots[0].memory(station.clock)
+        orders = [e for e in plant.journal.events() if getattr(e, "address", -1) == COMMAND]
+        registers.write = plain
         station.reader.start(100.0)
-        with pytest.raises((StationRefused, StationTimeout)):
+        with pytest.raises((StationRefused, StationTimeout)):  # it samples
             memory.set_offsets((1, 1, 1))
         station.reader.stop()
         memory.set_offsets((1, 1, 1))
         assert memory.offsets() == (1, 1, 1)
+    assert len(orders) == 1
+    assert plant.flash[0].erases == [1, 0]
+    assert plant.flash[0].read(0, plant.now_us)[0] == 0x1234
 
 
 KILLED = """
@@ -294,7 +276,13 @@ def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_writ
     assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "begun", "proved"]
 
 
-def test_the_command_asks_before_it_writes(run: Run) -> None:
+def test_the_command_asks_before_it_writes_and_what_was_revoked_is_not_written(run: Run) -> None:
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    ledger.revoke("A1", "fell to the floor", day=today())
+    with pytest.raises(WrongUse, match="fell to the floor"):
+        programmed(run, ("A1",))
+    assert programming(run.archive.root, "A1") == []
     words = ["station", "program", "latest", "--archive", str(run.archive.root), "--units", "A2"]
     refused = CliRunner().invoke(app, words, input="")
     assert isinstance(refused.exception, WrongUse)
@@ -332,10 +320,6 @@ def test_nothing_is_written_while_the_emergency_stop_is_pressed_or_the_door_open
         programmed(run, ("A1",))
     assert programming(run.archive.root, "A1") == []
     assert ledger.valid_at("A1", today()) is not None
-
-
-def test_a_device_that_is_named_twice_is_written_once(run: Run) -> None:
-    assert [unit.unit for _, unit in chosen_units(run, ["A1", "A1"])] == ["A1"]
 
 
 def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> None:
@@ -383,7 +367,6 @@ def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change
 def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_device_does_not_have(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another process certifies the unit between the begin of the lock and the first write, and between proof and renewal."""
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     real = job.open_lot

@@ -25,7 +25,6 @@ Change = Callable[[pd.DataFrame], pd.DataFrame]
 CONTENT: dict[str, Any] = {
     "columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "units": {"output": "g"}, "unit": "A1"
 }  # fmt: skip
-FACES = ["+x", "-x", "+y", "-y", "+z", "-z"]
 
 
 def how(**more: object) -> Mapping:
@@ -145,12 +144,7 @@ def test_files_that_are_no_tables_are_refused(row: tuple[bytes, str], tmp_path: 
                 {"columns": {**CONTENT["columns"], name: "t"}},
                 f"'{name}' is the name of a column that an import writes.*{cure}",
             )
-            for name, cure in (
-                ("record", "another name"),
-                ("kind", "another name"),
-                ("time_s", "map it as 'time'"),
-                ("out_x", "map it as 'x'"),
-            )
+            for name, cure in (("kind", "another name"), ("time_s", "map it as 'time'"), ("out_x", "map it as 'x'"))
         ),
         ({"columns": {**CONTENT["columns"], "temperature": "t", "unit_C": "u"}}, "temperature is mapped twice"),
     ]
@@ -161,27 +155,21 @@ def test_mappings_with_a_slip_are_refused(row: tuple[dict, str]) -> None:
         how(**content)
 
 
-def test_a_covariate_may_have_any_name_and_a_likely_slip_is_remarked() -> None:
-    columns = {"x": "a", "y": "b", "z": "c", "temprature": "d", "hum": "e"}
-    assert how(columns=columns).likely_slips == {"temprature": ("temperature",)}
-
-
-def test_refusals_of_a_record_of_nobody_of_pairs_without_a_sign_and_of_dates_elsewhere() -> None:
+def test_refusals_of_a_record_of_nobody_pairs_without_a_sign_dates_elsewhere_and_no_file(tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match="no unit is mapped"):
         imported(record(), how(unit=""), "f")
     with pytest.raises(WrongUse, match="--map: found 'x', name=value"):
         pairs("time=1,x", "--map")
     with pytest.raises(DataRejected, match="column 'ax' holds dates or times"):
         imported(record().assign(ax=pd.Timestamp("2026-01-01")), how(), "a.parquet")
-    with pytest.raises(WrongUse, match=r"'АВ' has 'А' \(U\+0410\), which only looks like a plain letter"):
-        lot_of(load_recipe(), ["АВ"])
-
-
-def test_says_so_when_there_is_neither_file_nor_run(tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match="neither a file nor a run"):
         exchange.read_dwells("lot-7", archive=tmp_path)
     with pytest.raises(WrongUse, match="cannot be read"):
         exchange.read_dwells(tmp_path / "missing.csv")
+    columns = {"x": "a", "y": "b", "z": "c", "temprature": "d", "hum": "e"}  # a covariate may have any name
+    assert how(columns=columns).likely_slips == {"temprature": ("temperature",)}
+    with pytest.raises(WrongUse, match=r"'АВ' has 'А' \(U\+0410\), which only looks like a plain letter"):
+        lot_of(load_recipe(), ["АВ"])
 
 
 def test_history_needs_a_temperature_and_each_time_once(tmp_path: Path) -> None:
@@ -253,12 +241,6 @@ def test_serials_of_digits_stay_text_and_dwells_keep_their_order_and_covariates(
     assert frame["dwell"].tolist() == [0, 1, 2, 3]
     assert covariates(frame) == ["hum"]
     assert len(exchange.checked(dwells(1), where="f.csv")) == 1  # one dwell of a unit needs no second time
-
-
-def faces(offset: float) -> pd.DataFrame:
-    """A sample for each face, without noise."""
-    force = np.array([[s * (k == a) for k in range(3)] for a in range(3) for s in (1.0, -1.0)]) + offset
-    return pd.DataFrame(force, columns=["ax", "ay", "az"]).assign(label=FACES)
 
 
 # -- names that could be a formula or markup ----------------------------------------------------------------------------

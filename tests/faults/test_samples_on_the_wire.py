@@ -18,20 +18,16 @@ SLOT_1 = 12
 
 
 def captured(monkeypatch: pytest.MonkeyPatch, script) -> tuple[MemorySink, MemoryLog]:
-    monkeypatch.setattr(wire, "script_of", lambda _world, _faults: script)
+    if script is None:
+        monkeypatch.undo()
+    else:
+        monkeypatch.setattr(wire, "script_of", lambda _world, _faults: script)
     config, lot = load_station(), lot_of()
     config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.6})})
     sink, events = MemorySink(), MemoryLog()
     with serve_plant(config, lot, make_plant(config, lot)) as station:
         capture(station, short_recipe(), lot, sink, progress=quiet_progress, events=events)
     return sink, events
-
-
-def undisturbed() -> MemorySink:
-    config, lot, sink = load_station(), lot_of(), MemorySink()
-    with serve_plant(config, lot, make_plant(config, lot)) as station:
-        capture(station, short_recipe(), lot, sink, progress=quiet_progress)
-    return sink
 
 
 def test_a_slot_whose_answer_to_what_was_taken_is_lost_is_asked_and_keeps_its_unit(monkeypatch) -> None:
@@ -47,7 +43,8 @@ def test_a_slot_whose_answer_to_what_was_taken_is_lost_is_asked_and_keeps_its_un
     assert len(lost) == 3
     assert (sink.all(1)["status"] == "ok").all()
     assert (sink.all(1)["n"] == 200).all()
-    assert sink.all(0).equals(undisturbed().all(0)), "nothing is taken twice, nothing is missing"
+    undisturbed, _ = captured(monkeypatch, None)
+    assert sink.all(0).equals(undisturbed.all(0)), "nothing is taken twice, nothing is missing"
 
 
 @pytest.mark.parametrize(
@@ -75,20 +72,6 @@ def test_samples_that_change_on_their_way_are_measured_again(monkeypatch, byte: 
     assert (sink.all(1)["status"] == "ok").all()
 
 
-def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:
-    config, lot = load_station(), lot_of(1)
-    plant = make_plant(config, lot)
-    with serve_plant(config, lot, plant) as station:
-        slot = station.reader.slots[0]
-        station.reader.start(100.0)
-        station.clock.sleep(1.0)
-        assert len(slot.take().outputs) == 100
-        plant.sampler.tail[0] = 50
-        station.clock.sleep(1.0)
-        with pytest.raises(StationRefused, match="reports 50 of 200 samples as read, 100 is needed"):
-            slot.take()
-
-
 @each(
     [
         (FaultOrder(kind="swapped_words", serial="U000"), lambda reader: reader.slots[0].identity(), "word order"),
@@ -103,3 +86,17 @@ def test_words_in_the_wrong_order_are_no_identity_and_a_reader_that_does_not_sta
     plant.inject(fault)
     with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match=words):
         asked(station.reader)
+
+
+def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:
+    config, lot = load_station(), lot_of(1)
+    plant = make_plant(config, lot)
+    with serve_plant(config, lot, plant) as station:
+        slot = station.reader.slots[0]
+        station.reader.start(100.0)
+        station.clock.sleep(1.0)
+        assert len(slot.take().outputs) == 100
+        plant.sampler.tail[0] = 50
+        station.clock.sleep(1.0)
+        with pytest.raises(StationRefused, match="reports 50 of 200 samples as read, 100 is needed"):
+            slot.take()

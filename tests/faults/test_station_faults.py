@@ -87,21 +87,11 @@ def test_a_server_that_is_gone_is_a_lost_link_with_its_address():
         port = server.port
         link = tcp_link(server.host, port, timeout_s=1.0, read_attempts=2)
         assert link.read(10, 0, 1, "slots") == [8]
+        with pytest.raises(StationRefused, match="free port"):  # its port is taken
+            PlantServer(make_plant(load_station(), lot_of(1)), port=port).__enter__()
     with pytest.raises((LinkLost, StationTimeout), match=f"127.0.0.1:{port}"):
         link.read(10, 0, 1, "slots")
     link.close()
-
-
-def test_a_port_that_is_taken_is_refused():
-    plant = make_plant(load_station(), lot_of(1))
-    with PlantServer(plant) as server, pytest.raises(StationRefused, match="free port"):
-        PlantServer(make_plant(load_station(), lot_of(1)), port=server.port).__enter__()
-
-
-def test_hardware_is_not_served():
-    config = load_station().model_copy(update={"kind": "modbus"})
-    with pytest.raises(WrongUse, match="a simulated station is needed"):
-        serve(config, lot_of(), host="127.0.0.1", port=0, speed=1.0, stop=threading.Event(), ready=print)
 
 
 def test_a_state_of_another_lot_is_refused():
@@ -126,8 +116,11 @@ def test_a_state_of_another_lot_is_refused():
     ],
     lambda row: row[1],
 )
-def test_a_station_file_with_a_typo_or_hardware_without_an_address_is_refused_with_what_was_meant(row, tmp_path):
+def test_a_station_file_with_a_typo_or_hardware_without_an_address_is_refused_and_hardware_not_served(row, tmp_path):
     text, needed = row
     (tmp_path / "station.toml").write_text(text, encoding="utf-8")
     with pytest.raises(RecipeInvalid, match=needed):
         load_station(tmp_path / "station.toml")
+    hardware = load_station().model_copy(update={"kind": "modbus"})
+    with pytest.raises(WrongUse, match="a simulated station is needed"):
+        serve(hardware, lot_of(), host="127.0.0.1", port=0, speed=1.0, stop=threading.Event(), ready=print)

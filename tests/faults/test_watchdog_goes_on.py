@@ -197,7 +197,7 @@ def test_a_second_run_of_a_station_is_refused_in_one_message_whatever_started_it
     first.release()
 
 
-def test_a_lease_is_on_the_disk_before_it_counts(state, monkeypatch):
+def test_a_lease_is_on_the_disk_before_it_counts_and_without_room_nothing_moves(state, monkeypatch):
     synced = []
     monkeypatch.setattr(lease_files.os, "fsync", synced.append)
     mine = Leases(state, new_holder("served", "a"), {"chamber": "here"}, 10.0)
@@ -205,8 +205,6 @@ def test_a_lease_is_on_the_disk_before_it_counts(state, monkeypatch):
     assert len(synced) == 2  # the note, and the folder that names it
     mine.release()
 
-
-def test_a_disk_without_room_for_a_lease_refuses_before_anything_moves(state, monkeypatch):
     def no_room(_handle):
         raise OSError(28, "No space left on device")
 

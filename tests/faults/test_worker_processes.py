@@ -247,11 +247,11 @@ def run_of_process(pid: int) -> Any:
     return SimpleNamespace(id="run-1", infrastructure_pid=str(pid))
 
 
-def processes(folder: Path, state: str, environment: bytes, flags: int = 4194560) -> Path:
+def processes(folder: Path, state: str, environment: bytes) -> Path:
     """A folder as ``/proc`` with process 7, whose name holds a bracket and a state."""
     process = folder / "7"
     process.mkdir(parents=True)
-    (process / "stat").write_text(f"7 (a) Z) {state} 1 7 7 0 -1 {flags} 0 0")
+    (process / "stat").write_text(f"7 (a) Z) {state} 1 7 7 0 -1 4194560 0 0")
     (process / "environ").write_bytes(environment)
     return process
 
@@ -281,11 +281,7 @@ def test_a_process_that_does_not_work_on_the_run_does_not_live(
     processes(tmp_path, state, environment)
     assert not dead_runs.lives(run_of_process(7))
     assert not dead_runs.lives(run_of_process(8))
-
-
-def test_a_thread_of_the_kernel_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run without a number looks at every process, among them a hundred such threads."""
-    monkeypatch.setattr(dead_runs, "PROCESSES", tmp_path)
+    # a run without a number looks at every process, among them a hundred threads of the kernel: none is waited for
     monkeypatch.setattr(dead_runs, "sleep", lambda _seconds: pytest.fail("waited"))
-    processes(tmp_path, "S", b"", flags=2129984)
+    (tmp_path / "7" / "stat").write_text("7 (a) Z) S 1 7 7 0 -1 2129984 0 0")
     assert not dead_runs.lives(SimpleNamespace(id="run-1", infrastructure_pid=None))

@@ -168,22 +168,18 @@ def test_clean_takes_nothing_that_is_being_written_or_measured_now(tmp_path: Pat
     assert not any(path.exists() for path in left)
 
 
-def test_clean_finds_what_a_killed_writer_left_out_of_the_chain(tmp_path: Path) -> None:
-    run = small_run(tmp_path)
-    list(Runner(small_job(tmp_path), run.archive, measure=CaptureDouble(stop_after=0)).all())
-    (run.path / "sealed.json").unlink()
+def test_what_a_killed_writer_left_out_of_the_chain_is_sealed_by_a_run_finished_again_and_by_clean(
+    tmp_path: Path,
+) -> None:
+    run, job = small_run(tmp_path), small_job(tmp_path)
+    mark, nothing = run.path / "sealed.json", CaptureDouble(stop_after=0)
+    list(Runner(job, run.archive, measure=nothing).all())
+    mark.unlink()
+    assert all(done.reused for done in Runner(job, run.archive, measure=nothing).all())
+    assert mark.is_file()
+    mark.unlink()
     Ledger(run.archive).add(event())
     done = clean(run.archive)
     assert (done.sealed, done.anchored) == ([run.id], 1)
     again = clean(run.archive)
     assert (again.sealed, again.anchored) == ([], 0)
-
-
-def test_a_run_that_is_finished_again_is_sealed(tmp_path: Path) -> None:
-    job, archive = small_job(tmp_path), Archive(tmp_path / "archive")
-    list(Runner(job, archive, measure=CaptureDouble()).all())
-    mark = archive.run("latest").path / "sealed.json"
-    mark.unlink()
-    runner = Runner(job, archive, measure=CaptureDouble(stop_after=0))
-    assert all(done.reused for done in runner.all())
-    assert mark.is_file()

@@ -56,7 +56,9 @@ def test_300_kb_of_xml_keep_verify_busy_for_seconds_at_most(name: str, tmp_path:
     assert (status, json.loads(out)["accepted"]) == (1, False)
 
 
-def test_a_damaged_namespace_is_a_sentence_and_a_verdict(tmp_path: Path) -> None:
+def test_a_damaged_namespace_is_a_sentence_and_a_verdict_and_too_little_memory_is_none(
+    tmp_path: Path, monkeypatch
+) -> None:
     damaged, words = document("", ' xmlns:n="relative"'), "it has no canonical form"
     with pytest.raises(SignatureBroken, match=f"{words} .* a namespace in it is not an absolute address"):
         canonical(parsed(damaged))
@@ -64,8 +66,6 @@ def test_a_damaged_namespace_is_a_sentence_and_a_verdict(tmp_path: Path) -> None
     status, out, _ = given("verify", tmp_path / "a.xml")
     assert (status, "no canonical form" in out) == (1, True)
 
-
-def test_too_little_memory_is_no_verdict(tmp_path: Path, monkeypatch) -> None:
     def full(*_: object) -> None:
         raise MemoryError
 
@@ -82,13 +82,6 @@ def archive(tmp_path: Path) -> Archive:
     return run.archive
 
 
-@pytest.fixture
-def secret(tmp_path: Path) -> Path:
-    (tmp_path / "system").mkdir()
-    (tmp_path / "system" / "passwd").write_text(SECRET, encoding="utf-8")
-    return tmp_path / "system"
-
-
 def test_audit_names_a_run_whose_manifest_is_nested_deeply(archive: Archive) -> None:
     deep = b'{"sha256": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
     (archive.root / "runs" / archive.runs()[0].id / "grades.json").write_bytes(deep)
@@ -97,29 +90,30 @@ def test_audit_names_a_run_whose_manifest_is_nested_deeply(archive: Archive) -> 
     assert "nested too deeply" in done.output or "nested too deeply" in str(done.exception)
 
 
-def test_the_workbench_serves_no_file_behind_a_link(archive: Archive, secret: Path, tmp_path: Path) -> None:
-    run = archive.run("latest")
+def test_neither_workbench_nor_backup_gives_what_is_behind_a_link_and_both_tell_it(
+    archive: Archive, tmp_path: Path
+) -> None:
+    run, secret = archive.run("latest"), tmp_path / "system"
+    secret.mkdir()
+    (secret / "passwd").write_text(SECRET, encoding="utf-8")
+    report = Path(run.report).read_bytes()
     Path(run.report).unlink()
     Path(run.report).symlink_to(secret / "passwd")
     settings = WorkbenchSettings(archive=str(archive.root), folder=tmp_path / "bench")
-    client = AsgiClient(create_app(settings), settings.address)
-    answer = client.get(f"/run/report.html?run={run.id}")
+    answer = AsgiClient(create_app(settings), settings.address).get(f"/run/report.html?run={run.id}")
     assert answer.status_code == 422
     assert "is a symbolic link to" in answer.json()["problem"]
     assert SECRET not in answer.text
-
-
-def test_a_backup_copies_nothing_behind_a_link_and_tells_it(archive: Archive, secret: Path, tmp_path: Path) -> None:
-    run = archive.run("latest").id
+    Path(run.report).unlink()
+    Path(run.report).write_bytes(report)
     (archive.root / "runs" / "foreign").symlink_to(secret)
-    (archive.root / "runs" / run / "notes.txt").symlink_to(secret / "passwd")
-    with pytest.raises(
-        ArchiveUnusable, match=r"backup: 2 symbolic links .* were not followed: runs/foreign, runs/.*/notes.txt"
-    ):
+    (archive.root / "runs" / run.id / "notes.txt").symlink_to(secret / "passwd")
+    told = r"backup: 2 symbolic links .* were not followed: runs/foreign, runs/.*/notes.txt"
+    with pytest.raises(ArchiveUnusable, match=told):
         copy_archive(archive, Archive(tmp_path / "copy"))
     copied = {one.relative_to(tmp_path / "copy").as_posix() for one in (tmp_path / "copy").rglob("*") if one.is_file()}
     assert not any("passwd" in name or "notes" in name for name in copied)
-    assert f"runs/{run}/grades.parquet" in copied  # all other files
+    assert f"runs/{run.id}/grades.parquet" in copied  # all other files
 
 
 def test_every_reader_of_an_archive_refuses_what_is_behind_a_link(archive: Archive, tmp_path: Path) -> None:

@@ -28,20 +28,15 @@ C = [[0.04, -1.38, 0.88, 0.14, -1.46, -0.29, 0.02, -0.46, 1.77, -1.49],
      [-0.15, -0.96, 0.67, 0.11, -1.45, -0.49, 0.21, -0.49, 1.87, -2.16]]  # fmt: skip
 STUDY = np.moveaxis(np.array([A, B, C]), -1, 0)
 
-IN_CONTROL_RUN_LENGTH = (
-    91.75  # points between false signals of the four rules together (Champ and Woodall 1987, table 1)
-)
+IN_CONTROL_RUN_LENGTH = 91.75  # points between false signals of the four rules (Champ and Woodall 1987, table 1)
 EWMA_RUN_LENGTH = 500.0  # of the chart's own weight and width (Lucas and Saccucci 1990; Montgomery, table 9.11)
 
 
-def test_individuals_chart_of_the_handbook():
+def test_charts_of_the_handbook():
     chart = baseline(FLOW)
     assert chart.centre == pytest.approx(50.81)
     assert chart.centre + 3.0 * chart.sigma == pytest.approx(55.8041, abs=2e-4)
     assert chart.centre - 3.0 * chart.sigma == pytest.approx(45.8159, abs=2e-4)
-
-
-def test_ewma_of_the_handbook():
     chart = ewma(np.array(EWMA_DATA), Baseline(50.0, 2.0539), weight=0.3, width=3.0)
     assert chart.average == pytest.approx(EWMA_PRINTED, abs=0.011)
     assert 50.0 + chart.half_width[-1] == pytest.approx(52.5884, abs=2e-3)
@@ -136,18 +131,12 @@ def test_groups_are_compared_as_scipy_does(rng):
     assert comparison.rank_p == pytest.approx(stats.kruskal(*parts).pvalue)
 
 
-def test_sigma_is_that_of_the_median_absolute_deviation(rng):
+def test_sigma_holm_s_steps_and_e_n_are_those_of_their_formulas(rng):
     values = rng.standard_normal((40, 3))
     values[5, 1] = np.nan
     plain = np.nanmedian(np.abs(values - np.nanmedian(values, axis=0)), axis=0) / stats.norm.ppf(0.75)
     assert sigma_of(values) == pytest.approx(plain, rel=1e-12)
-
-
-def test_holm_s_steps():
-    """Holm (1979): the smallest times n, the next times n − 1, and never falling."""
+    # Holm (1979): the smallest times n, the next times n − 1, and never falling
     assert holm(np.array([0.01, 0.04, 0.03, 0.005])) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-
-
-def test_e_n_of_the_standard_s_formula():
-    """ISO/IEC 17043 B.3.1.3 with expanded uncertainties 0.3 and 0.4: 0.5 apart is exactly one."""
+    # ISO/IEC 17043 B.3.1.3 with expanded uncertainties 0.3 and 0.4: 0.5 apart is exactly one
     assert e_n(np.array([10.5]), np.array([10.0]), np.array([0.15]), np.array([0.2]))[0] == pytest.approx(1.0)

@@ -2,21 +2,17 @@
 
 import numpy as np
 import pytest
+from each import each
 from scipy.signal import lsim
 
 from inertial.dynamics import centrifuge, pulses, sine_fit, spectra, stability, tilt
 from inertial.errors import NotIdentified
+from schemas.vibration_profile import load_vibration_profile, vibration_profiles
 
 
-@pytest.mark.parametrize(
-    ("zeta", "three_db"),
-    [
-        *((0.5, 1.272), (0.6, 1.148), (0.65, 1.080), (0.7, 1.010)),
-        *((0.7071, 1.000), (0.75, 0.940), (0.8, 0.871), (1.0, 0.644)),
-    ],
-)
-def test_band_edges_of_a_second_order_sensor(zeta: float, three_db: float) -> None:
-    assert spectra.bandwidth(1.0, zeta) == pytest.approx(three_db, abs=6e-4)
+def test_band_edges_of_a_second_order_sensor() -> None:
+    edges = {0.5: 1.272, 0.6: 1.148, 0.65: 1.080, 0.7: 1.010, 0.7071: 1.000, 0.75: 0.940, 0.8: 0.871, 1.0: 0.644}
+    assert {zeta: spectra.bandwidth(1.0, zeta) for zeta in edges} == pytest.approx(edges, abs=6e-4)
 
 
 SEVERITIES = {
@@ -25,9 +21,9 @@ SEVERITIES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("severity", "velocity"), SEVERITIES.items())
-def test_velocity_change_of_the_severities_of_iec_60068_2_27(severity: tuple[float, float], velocity: float) -> None:
-    assert pulses.velocity_change(severity[0], 1e-3 * severity[1]) == pytest.approx(velocity, abs=6e-3)
+def test_velocity_change_of_the_severities_of_iec_60068_2_27() -> None:
+    made = {(peak, ms): pulses.velocity_change(peak, 1e-3 * ms) for peak, ms in SEVERITIES}
+    assert made == pytest.approx(SEVERITIES, abs=6e-3)
 
 
 def test_the_peak_of_a_noisy_pulse_is_not_its_largest_sample(rng: np.random.Generator) -> None:
@@ -91,6 +87,9 @@ def test_sine_fit_variances(rng: np.random.Generator) -> None:
     assert np.std(amplitude) / (0.1 * np.sqrt(2 / n)) == pytest.approx(0.996, abs=0.05)
     assert np.std(phase) / (0.1 * np.sqrt(2 / n)) == pytest.approx(1.007, abs=0.05)
     assert np.mean(phase) == pytest.approx(0.4, abs=1e-3)
+    t = np.arange(3000) / 1000.0
+    record = (np.sin(2 * np.pi * t) + 0.5 * t / 3.0)[:, None]  # the linear term takes a drift out
+    assert abs(sine_fit.fit_tone(record, 1000.0, 1.0).value[0]) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_wrong_frequency_lowers_the_amplitude_and_the_fourth_parameter_repairs_it(rng: np.random.Generator) -> None:
@@ -112,21 +111,15 @@ def test_a_wrong_frequency_lowers_the_amplitude_and_the_fourth_parameter_repairs
     assert tone.frequency_error == pytest.approx(np.sqrt(6.0 / t.size) / np.pi * 0.1, rel=0.05)  # √6/π·(σ/A)/(T√N)
 
 
-def test_the_linear_term_takes_a_drift_out() -> None:
-    t = np.arange(3000) / 1000.0
-    record = (np.sin(2 * np.pi * t) + 0.5 * t / 3.0)[:, None]
-    assert abs(sine_fit.fit_tone(record, 1000.0, 1.0).value[0]) == pytest.approx(1.0, abs=1e-9)
-
-
-def test_confidence_of_a_density() -> None:
+def test_confidence_of_a_density_what_is_folded_and_limits_of_the_exciter() -> None:
     for n, low, high in ((60, -2.3, 1.9), (120, -1.6, 1.3), (240, -1.1, 1.0)):
         assert spectra.density_confidence(n / 2.0) == pytest.approx((low, high), abs=0.13)
-
-
-def test_what_five_times_the_bandwidth_leaves_folded() -> None:
     for times, second, one in ((5, -24, -12), (10, -38, -19), (20, -51, -26)):
         folded = [20 * np.log10(spectra.folded_share(times, 1.0, order)) for order in (2, 1)]
         assert folded == pytest.approx([second, one], abs=0.6)
+    for stroke, start in ((0.005, 15.8), (0.0127, 9.9), (0.0254, 7.0)):
+        level = spectra.largest_level(start, displacement_m=stroke, velocity_m_s=10.0, acceleration_g=50.0)
+        assert level == pytest.approx(5.0, rel=0.01)
 
 
 def test_overall_level_and_the_hann_mean(rng: np.random.Generator) -> None:
@@ -139,12 +132,6 @@ def test_overall_level_and_the_hann_mean(rng: np.random.Generator) -> None:
     assert np.std(made.mean(axis=1)) > 3e-3
 
 
-def test_limits_of_the_exciter_decide_the_level() -> None:
-    for stroke, start in ((0.005, 15.8), (0.0127, 9.9), (0.0254, 7.0)):
-        level = spectra.largest_level(start, displacement_m=stroke, velocity_m_s=10.0, acceleration_g=50.0)
-        assert level == pytest.approx(5.0, rel=0.01)
-
-
 def test_centrifuge_relations() -> None:
     x = np.linspace(0.1, 1.0, 10)
     for largest, k2, k3 in ((1.0, 69, 127), (10.0, 0.69, 0.13), (100.0, 0.0069, 0.00013)):
@@ -152,10 +139,7 @@ def test_centrifuge_relations() -> None:
         estimate = centrifuge.fit_polynomial(a, a, np.full(20, 1e-4), centrifuge.TERMS[:4])
         assert 1e6 * estimate.of("second_order")[1] == pytest.approx(k2, rel=0.35)
         assert 1e6 * estimate.of("third_order")[1] == pytest.approx(k3, rel=0.35)
-
-
-def test_linearity_is_by_the_least_squares_line() -> None:
-    for terms, value in (((0.0, 1.0, 1.0, 0.0), 66.7), ((0.0, 1.0, 0.0, 1.0), 38.5)):
+    for terms, value in (((0.0, 1.0, 1.0, 0.0), 66.7), ((0.0, 1.0, 0.0, 1.0), 38.5)):  # by the least-squares line
         p = centrifuge.Polynomial(centrifuge.TERMS[:4], np.array(terms), np.eye(4), np.zeros(1), 0.0, 1)
         assert centrifuge.linearity_percent(p, 1.0) == pytest.approx(value, rel=0.05)
 
@@ -169,12 +153,9 @@ def test_one_plane_of_tilt_gives_the_known_uncertainties() -> None:
         whole = tilt.fit_tilt(angle, np.sin(angle), np.ones(n), orders=3)
         uncertainties = (whole.of("bias")[1], whole.scale[1], whole.of("second_order")[1], whole.of("third_order")[1])
         assert uncertainties == pytest.approx(more, abs=0.01)
-
-
-def test_a_cubic_raises_the_scale_by_three_quarters() -> None:
     angle = 2 * np.pi * np.arange(24) / 24
     fit = tilt.fit_tilt(angle, np.sin(angle) + 1e-3 * np.sin(angle) ** 3, np.ones(24))
-    assert fit.scale[0] - 1.0 == pytest.approx(0.75e-3, rel=1e-6)
+    assert fit.scale[0] - 1.0 == pytest.approx(0.75e-3, rel=1e-6)  # a cubic raises the scale by three quarters
     assert fit.residuals == pytest.approx(-0.25e-3 * np.sin(3 * angle), abs=1e-12)
 
 
@@ -213,10 +194,8 @@ OVERALL = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", OVERALL)
+@each(OVERALL)
 def test_overall_level_of_the_profiles(name: str) -> None:
-    from schemas.vibration_profile import load_vibration_profile, vibration_profiles
-
     assert set(OVERALL) == set(vibration_profiles())
     points = np.array(load_vibration_profile(name).breakpoints)
     assert spectra.overall_level(points[:, 0], points[:, 1]) == pytest.approx(OVERALL[name], rel=2e-3)

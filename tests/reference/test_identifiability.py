@@ -46,7 +46,7 @@ def monomials(force, degree):
 
 
 @pytest.mark.parametrize("name", TABLE)
-def test_the_table_of_identifiability_is_reproduced(name):
+def test_the_table_of_identifiability_and_the_ranks_of_polynomials_on_the_sphere_are_reproduced(name):
     state = planned(name)
     for axis in range(3):
         base = np.concatenate([np.ones((len(state.time), 1)), state.force], axis=1)
@@ -59,14 +59,15 @@ def test_the_table_of_identifiability_is_reproduced(name):
                 continue
             left = np.linalg.norm(values - span @ (span.T @ values)) / np.linalg.norm(values)
             assert left == pytest.approx(expected, abs=0.006 if axis == 0 else 0.035)
-
-
-@pytest.mark.parametrize("name", RANKS)
-def test_the_ranks_of_polynomials_on_the_sphere_are_reproduced(name):
-    force = planned(name).force
     for degree, expected in zip((2, 3, 4), RANKS[name], strict=True):
-        terms = monomials(force, degree)
-        assert np.linalg.matrix_rank(terms, tol=1e-8) == expected
+        assert np.linalg.matrix_rank(monomials(state.force, degree), tol=1e-8) == expected
+    # the command tells the same part axis by axis
+    ids = ("second_order", "third_order", "odd_quadratic", "scale_asymmetry", "cross_coupling")
+    rows = {s.effect: s for s in visibility.visibilities(state, BASE, 1e-5, ids)}
+    for (effect, _), expected in zip(COLUMNS, TABLE[name], strict=True):
+        if effect in ids:
+            by_axis = rows[effect].by_axis if rows[effect].seen else (0.0, 0.0, 0.0)
+            assert by_axis == pytest.approx([expected] * 3, abs=0.035)
 
 
 def test_second_order_terms_add_up_to_the_bias_and_third_order_ones_to_the_scale():
@@ -77,16 +78,6 @@ def test_second_order_terms_add_up_to_the_bias_and_third_order_ones_to_the_scale
         assert own + across.sum(axis=1) == pytest.approx(np.ones(60))
         f = state.force
         assert (f**2).sum(axis=1) * f[:, axis] == pytest.approx(f[:, axis])
-
-
-@pytest.mark.parametrize("name", TABLE)
-def test_the_command_tells_the_same_part_axis_by_axis(name):
-    ids = ("second_order", "third_order", "odd_quadratic", "scale_asymmetry", "cross_coupling")
-    rows = {s.effect: s for s in visibility.visibilities(planned(name), BASE, 1e-5, ids)}
-    for (effect, _), expected in zip(COLUMNS, TABLE[name], strict=True):
-        if effect in ids:
-            by_axis = rows[effect].by_axis if rows[effect].seen else (0.0, 0.0, 0.0)
-            assert by_axis == pytest.approx([expected] * 3, abs=0.035)
 
 
 BASE = ("bias", "scale", "misalignment")
@@ -118,18 +109,12 @@ def ageing_of(state):
     return visibility.visibilities(state, THERMAL, 1e-5, ["aging_linear", "scale_aging"])
 
 
-def test_monotone_soaks_hide_ageing_as_far_as_published():
+def test_monotone_soaks_hide_ageing_as_far_as_published_soaks_up_and_down_show_all_and_shuffled_ones_most(rng):
     ageing, scale_ageing = (sight.remaining_fraction for sight in ageing_of(soaks(RISING)))
     assert ageing == pytest.approx(0.021, abs=0.001)
     assert scale_ageing == pytest.approx(0.005, abs=0.0005)
-
-
-def test_soaks_up_and_down_show_all_of_ageing():
     for one in ageing_of(soaks(CLOSED)):
         assert one.by_axis == pytest.approx([1.0, 1.0, 1.0], abs=0.005)
-
-
-def test_shuffled_soaks_show_most_of_ageing(rng):
     orders = [rng.permutation(CLOSED) for _ in range(60)]
     parts = [[sight.remaining_fraction for sight in ageing_of(soaks(order))] for order in orders]
     ageing, scale_ageing = np.mean(parts, axis=0)
@@ -171,22 +156,17 @@ def test_a_ramp_in_one_pose_makes_the_rate_a_function_of_the_temperature():
     assert left(late, ("bias", "bias_temperature"), column, axis=2) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("plan", "effect", "floor"),
-    [("six", "second_order", 30.0), ("twenty_six", "second_order", 24.0), ("six", "cross_coupling", None),
-     ("twenty_six", "cross_coupling", 25.0), ("six", "third_order", None), ("twenty_six", "third_order", 47.0)],
-)  # fmt: skip
-def test_three_sigma_floors_are_the_published_ones(plan, effect, floor):
-    (sight,) = visibility.visibilities(planned(plan), BASE, 11.4e-6, [effect])
-    if floor is None:
-        assert not sight.seen
-        assert sight.floor == np.inf
-    else:
-        assert 1e6 * sight.floor == pytest.approx(floor, rel=0.05)
+FLOORS = {
+    ("six", "second_order"): 30.0, ("twenty_six", "second_order"): 24.0, ("six", "cross_coupling"): np.inf,
+    ("twenty_six", "cross_coupling"): 25.0, ("six", "third_order"): np.inf, ("twenty_six", "third_order"): 47.0,
+}  # fmt: skip
 
 
-def test_a_floor_under_a_given_covariance_is_that_of_white_noise_where_it_is_white():
-    state = planned("twenty_six")
-    white = visibility.visibilities(state, BASE, 11.4e-6, ["third_order"])[0].floor
-    given = visibility.visibilities(state, BASE, 1.0, ["third_order"], covariance=11.4e-6**2 * np.eye(26))[0].floor
-    assert given == pytest.approx(white)
+def test_three_sigma_floors_are_the_published_ones_also_under_the_same_noise_as_a_covariance():
+    for (plan, effect), floor in FLOORS.items():
+        (sight,) = visibility.visibilities(planned(plan), BASE, 11.4e-6, [effect])
+        assert sight.seen == np.isfinite(floor), (plan, effect)
+        assert 1e6 * sight.floor == pytest.approx(floor, rel=0.05), (plan, effect)
+        n = len(planned(plan).time)
+        (given,) = visibility.visibilities(planned(plan), BASE, 1.0, [effect], covariance=11.4e-6**2 * np.eye(n))
+        assert given.floor == pytest.approx(sight.floor)

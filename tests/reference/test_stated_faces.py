@@ -63,12 +63,7 @@ def biases(rng, kind, hand_deg, lots):
 @pytest.mark.parametrize("kind", ["white", "flicker", "walk"])
 @pytest.mark.parametrize(("lots", "least"), [(12, 0.83), pytest.param(200, 0.93, marks=pytest.mark.slow)])
 def test_the_bias_of_six_faces_lies_within_its_uncertainty(rng, kind, hand_deg, lots, least):
-    """By two degrees of freedom of each output alone 81 % of them did.
-
-    Of exact faces with white noise 97 % do: the scatter of six dwells may raise the noise of the samples, not lower it. A tilt
-    moves the outputs of two axes of three, in a pattern that six dwells do not tell from wander of all three: the uncertainty is
-    twice what it need be, and the verdict is "not adequate".
-    """
+    """By two degrees of freedom of each output alone 81 % did; a tilt, which looks like wander, makes U twice what it need be."""
     errors, stated = biases(rng, kind, hand_deg, lots)
     assert np.mean(np.abs(errors) < COVERAGE * stated) >= least
     # of a walk the fit states the bias at any time of it, not the mean over the record alone
