@@ -76,13 +76,10 @@ def test_a_dwell_far_off_in_normal_noise_is_named(dwells, deviations, runs, monk
     assert hits >= min(0.95 * runs, runs - 1)
 
 
-def test_two_bad_dwells_do_not_pass_for_the_tails_of_each_other(monkeypatch):
+def test_two_bad_dwells_are_no_tails_of_each_other_and_one_axis_at_six_deviations_is_not_named(monkeypatch):
     values = drawn(0.0, 576, np.random.default_rng(9))
     values[5], values[80] = [20.0, -15.0, 20.0], [0.0, 25.0, -20.0]
     assert sorted(named(values, monkeypatch)) == [5, 80]
-
-
-def test_one_axis_alone_at_six_deviations_is_left_out_and_not_named(monkeypatch):
     values = drawn(0.0, 72, np.random.default_rng(10))
     values[5] = [6.3, 0.2, -0.4]
     assert named(values, monkeypatch) == []

@@ -30,12 +30,9 @@ def family() -> Family:
     return family_of(*calibrations(np.random.default_rng(8), 150, 6))
 
 
-def test_the_errors_of_the_calibrations_are_not_in_the_spread_of_the_units(family: Family) -> None:
+def test_spreads_of_units_and_of_lots_are_told_apart_without_the_errors_of_the_calibrations(family: Family) -> None:
     np.testing.assert_allclose(family.unit, np.stack([WITHIN] * AXES), rtol=0.25, atol=0.35)
     assert np.all(np.abs(family.mean - MEAN) < 4.0 * np.sqrt(np.diagonal(family.error, axis1=-2, axis2=-1)))
-
-
-def test_a_spread_between_lots_is_told_from_one_inside_them(family: Family) -> None:
     between = np.diagonal(family.lot, axis1=-2, axis2=-1)
     assert between[:, 0] == pytest.approx(2.0, rel=0.5)
     assert np.all(between[:, 1:] < [0.3, 0.1])

@@ -123,7 +123,9 @@ def test_one_colour_of_a_legend_means_one_thing() -> None:
     assert len({ROLES[role] for role in apart}) == len(apart)
 
 
-def test_plots_stand_one_under_the_other_in_the_layout_of_narrow_screens() -> None:
+def test_on_narrow_screens_plots_stand_one_under_the_other_lines_are_divided_names_are_fewer_and_a_sphere_is_low() -> (
+    None
+):
     figure = plotly_figure(chart())
     wide, narrow = figure["layout"], figure["narrow"]
     assert wide["xaxis"]["domain"][1] < wide["xaxis2"]["domain"][0]
@@ -131,9 +133,6 @@ def test_plots_stand_one_under_the_other_in_the_layout_of_narrow_screens() -> No
     assert narrow["yaxis"]["domain"][0] > narrow["yaxis2"]["domain"][1]
     assert narrow["height"] > wide["height"] + chart().height
     assert "narrow" not in plotly_figure(replace(chart(), columns=1))
-
-
-def test_on_narrow_screens_long_lines_are_divided_names_are_fewer_and_a_sphere_is_as_high_as_its_outline() -> None:
     axes = PlotAxis("a" * 30 + " b / µg", names=tuple(f"p{k}" for k in range(40))), PlotAxis("y")
     plot = Plot("", *axes, (Trace("", np.arange(40.0), np.arange(40.0)),))
     figure = plotly_figure(Chart("", (plot,), note="word " * 20))

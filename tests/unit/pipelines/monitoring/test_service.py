@@ -299,7 +299,7 @@ def test_alerts_are_posted_as_they_come_and_go_on_after_a_refusal_and_an_unexpec
     assert [one["kind"] for one in accepted] == ["unsafe"]
 
 
-def test_messages_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_and_the_error_of_a_command_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("TUMBLELINE_LOG", raising=False)
     assert log_line("line-1: it is", queue="line-1") == "tumbleline: line-1: it is\n"
     monkeypatch.setenv("TUMBLELINE_LOG", "json")
@@ -308,9 +308,6 @@ def test_messages_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
     content = json.loads(line)
     assert (content["message"], content["level"], content["queue"]) == ("a\n“b”", "error", "line-1")
     assert datetime.fromisoformat(content["when"]).tzinfo is not None
-
-
-def test_a_command_tells_its_error_as_json_on_request() -> None:
     command = [sys.executable, "-m", "pipelines.cli", "--log", "json", "shw"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from long_suites import mostly_slow
 from numpy.typing import NDArray
+from procedure_records import procedure_records
 from scipy import optimize, signal
 from small_station import captured, lot_of, short_recipe, station_of
 
@@ -14,8 +15,7 @@ from inertial.frames import force_from_angles
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable, roles_of
 from pipelines.procedures.exposure import PLAIN
 from pipelines.procedures.figures import FigureValue, Outcome
-from pipelines.procedures.recorded import Device, nominal_device, procedure_record
-from pipelines.schedule.steps import steps
+from pipelines.procedures.recorded import Device
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
 from schemas.simulation import Hidden
@@ -42,13 +42,7 @@ def recipe_of(**keys: Any) -> Recipe:
 def measured(config: StationConfig, recipe: Recipe | None = None) -> tuple[pd.DataFrame, Device]:
     recipe, lot = recipe or recipe_of(), lot_of(2)
     sink = captured(recipe, lot, config, roles=roles_of(recipe))
-    readings = sink.all(1)
-    records = [
-        procedure_record(k, step.order, [sink.records[k][0]], readings[readings["record"] == k])
-        for k, step in enumerate(steps(recipe))
-        if step.order is not None
-    ]
-    device = nominal_device(readings)
+    records, device = procedure_records(recipe, sink)
     return EXPOSURE.reduce(parts_of(recipe)[0], records, device), device
 
 

@@ -234,17 +234,6 @@ def test_values_of_the_xml_are_those_of_the_archive_in_si_units(made: Run, xml: 
     assert si_unit("furlong") is None
 
 
-def test_nothing_says_accredited_without_an_accreditation_in_the_file(
-    made: Run, laboratory: Path, xml: bytes, paper: bytes
-) -> None:
-    assert not re.search("accredit", " ".join(text_of(paper)) + xml.decode(), re.IGNORECASE)
-    laboratory.write_text(LABORATORY.replace("Example Sensor Works", "Accredited Sensor Works"), encoding="utf-8")
-    with pytest.raises(RecipeInvalid, match=r"laboratory.name: speaks of accreditation, \[laboratory.accreditation\]"):
-        read_laboratory(laboratory)
-    c = content(made, text=LABORATORY + ACCREDITATION)
-    assert "D-K-00000-01 (DAkkS)" in text_of(pdf(c, dcc(c)))[0]
-
-
 def test_an_interval_is_printed_only_where_the_customer_agreed(
     made: Run, paper: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -333,7 +322,9 @@ def test_u_has_two_digits_and_the_value_ends_where_u_ends_in_certificate_and_rep
         assert with_uncertainty(value, expanded) == report_rounding(value, expanded) == shown
 
 
-def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
+def test_a_laboratory_file_with_a_slip_is_refused_and_nothing_says_accredited_without_an_accreditation_in_it(
+    laboratory: Path, made: Run, xml: bytes, paper: bytes
+) -> None:
     for old, new, why in (
         ('country = "DE"', 'country = "Germany"', r"laboratory\.country"),
         ("[customer]", "[costumer]", "unknown key 'costumer'"),
@@ -345,6 +336,12 @@ def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
             read_laboratory(laboratory)
     with pytest.raises(WrongUse, match=r"is not there, one with \[laboratory\]"):
         read_laboratory(laboratory.parent / "none.toml")
+    assert not re.search("accredit", " ".join(text_of(paper)) + xml.decode(), re.IGNORECASE)
+    laboratory.write_text(LABORATORY.replace("Example Sensor Works", "Accredited Sensor Works"), encoding="utf-8")
+    with pytest.raises(RecipeInvalid, match=r"laboratory.name: speaks of accreditation, \[laboratory.accreditation\]"):
+        read_laboratory(laboratory)
+    c = content(made, text=LABORATORY + ACCREDITATION)
+    assert "D-K-00000-01 (DAkkS)" in text_of(pdf(c, dcc(c)))[0]
 
 
 def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
@@ -357,7 +354,7 @@ def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
     assert "not claimed" in traceability(StatedBudget(**own, references=(), grade_source="data_sheet"), entries)
 
 
-def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(
+def test_the_certificate_states_the_verdict_with_p_what_u_does_not_contain_and_no_probability_of_0(
     c: CertificateContent, xml: bytes
 ) -> None:
     assert re.fullmatch(r"ADEQUATE \(p (= 0\.\d+|= 1)\)", c.adequacy)
@@ -369,9 +366,6 @@ def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(
     assert c.left_out in declared
     assert c.adequacy in printed
     assert c.left_out in printed
-
-
-def test_a_probability_of_false_acceptance_is_never_0_and_rows_of_nothing_are_one(c: CertificateContent) -> None:
     none = c.model_copy(update={"conformity": tuple(one.model_copy(update={"pfa": 0.0}) for one in c.conformity)})
     assert "probability of false acceptance < 1e-4" in html.unescape(dcc(none).decode())
     parts = {part.get("title"): part for part in page_content(c)["parts"]}
