@@ -69,7 +69,10 @@ OF_SOME = (stale_temperature, spikes, quantised, clock_jitter, dropped_samples)
 FAULTS = {"axis_flip ": swap_axes} | {fault.__name__: fault for fault in (*AT_ONCE, *OF_SOME)}
 
 
-@pytest.mark.parametrize("name", sorted(set(FAULTS) - {"wrong_units", "dropped_samples"}))  # seen beside others alone
+SEEN_ALONE = sorted(set(FAULTS) - {"wrong_units", "dropped_samples"})  # these are seen beside others only
+
+
+@pytest.mark.parametrize("name", mostly_slow(SEEN_ALONE, "axis_flip", "dead_channel", "spikes", "stale_temperature"))
 def test_a_fault_blocks_a_unit_that_is_alone(name, rng):
     table = lots.lot(rng, units=1)
     FAULTS[name](table, table.index.to_numpy(), rng)

@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 import threading
 from collections import Counter
 from collections.abc import Iterator
@@ -18,6 +16,7 @@ import yaml
 from asgi_client import AsgiClient
 from capture_double import small_run
 from each import each
+from in_process import given
 from prometheus_client.parser import text_string_to_metric_families
 from root_process import ROOT
 
@@ -308,10 +307,9 @@ def test_messages_and_the_error_of_a_command_are_text_or_json(monkeypatch: pytes
     content = json.loads(line)
     assert (content["message"], content["level"], content["queue"]) == ("a\n“b”", "error", "line-1")
     assert datetime.fromisoformat(content["when"]).tzinfo is not None
-    command = [sys.executable, "-m", "pipelines.cli", "--log", "json", "shw"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    content = json.loads(done.stderr)
+    status, _, err = given("--log", "json", "shw")
+    assert status == 2
+    content = json.loads(err)
     assert (content["level"], content["status"]) == ("error", 2)
     assert "no command is called 'shw'" in content["message"]
 
