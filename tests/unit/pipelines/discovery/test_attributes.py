@@ -56,7 +56,7 @@ def test_a_value_of_a_run_holds_for_its_units_unless_they_have_their_own_and_wha
     )
     added = add_attributes(archive, table("serial,grade,wafer A1,pass,W1"), "serial", "a.csv")
     assert added["refused"] == ["grade"]
-    assert known_attributes(archive).names() == ["wafer"]
+    assert known_attributes(archive).names() == ["fixture", "wafer"]
 
 
 REFUSED = {

@@ -111,14 +111,10 @@ def contrast(one: str, other: str) -> float:
     return (max(light) + 0.05) / (min(light) + 0.05)
 
 
-@pytest.mark.parametrize("scale", [DIVERGING, SEQUENTIAL], ids=["diverging", "sequential"])
-def test_no_colour_of_a_scale_is_that_of_a_light_or_a_dark_page(scale: tuple[tuple[float, str], ...]) -> None:
-    for _, colour in scale:
+def test_no_colour_of_a_scale_is_that_of_a_page_and_one_colour_of_a_legend_means_one_thing() -> None:
+    for _, colour in (*DIVERGING, *SEQUENTIAL):
         for page in ("#ffffff", "#f4f6f8", "#22252a", "#1a2026"):
             assert contrast(colour, page) > 1.6, (colour, page)
-
-
-def test_one_colour_of_a_legend_means_one_thing() -> None:
     apart = ("x", "y", "z", "fourth", "before", "after", "muted", "ink", "good")
     assert len({ROLES[role] for role in apart}) == len(apart)
 

@@ -115,7 +115,6 @@ def test_a_run_is_followed_to_what_it_runs_again_and_a_unit_without_certificate_
     more = archive.open_run("small-next", {**run.about, "parents": [again.id], "rerun_of": None}, {"more": 1})
     assert {again.id, run.id} <= labels(lineage(archive, more.id), "run")
     assert again.id in labels(lineage(archive, run.id), "run")
-    shutil.copytree(run.archive.root, tmp_path / "archive")
     shutil.rmtree(tmp_path / "archive" / "calibrations")
     traced = lineage(Archive(tmp_path / "archive"), "A3")
     assert (traced.kind, traced.focus) == ("unit", (f"runs/{run.id}/grades.parquet",))
