@@ -7,7 +7,7 @@ from typing import Any, cast
 import pytest
 from capture_double import recipe_file
 from each import each
-from in_process import given, refused, text_of
+from in_process import given, text_of
 from root_process import ROOT
 
 from inertial.counts import size_text
@@ -23,37 +23,36 @@ from schemas.station import StationConfig, load_station
 from schemas.toml_files import PATTERNS
 
 
-def planned(recipe: str) -> tuple[int, str]:
-    """Status of a plan, and all that it says."""
-    status, out, err = given("plan", recipe)
-    return status, " ".join(f"{out} {err}".split())
+def all_said(*words: object) -> str:
+    """Standard output and error of a command as one line."""
+    return " ".join(" ".join(given(*words)[1:]).split())
 
 
 def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     recipe = recipe_file(tmp_path)
-    assert "refuses" not in planned(recipe)[1]
+    assert "refuses" not in all_said("plan", recipe)
     hot = recipe_file(tmp_path, ("[0.0, 50.0]", "[0.0, 298.0]"), ('"consumer"', '"production"'), name="hot.toml")
-    status, said = planned(hot)
-    assert status == 1  # a plan tells what a run refuses
+    assert given("plan", hot)[0] == 1  # a plan tells what a run refuses
+    said = all_said("plan", hot)
     assert "'tumbleline run' refuses this recipe" in said
     assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in said
     units = load_recipe(recipe).units
     for bad in ("LN 01", ""):
         serials = recipe_file(tmp_path, (f'"{units[0]}"', f'"{bad}"'), name="serials.toml")
-        assert "'tumbleline run' refuses this recipe: lot: " in planned(serials)[1], bad
+        assert "'tumbleline run' refuses this recipe: lot: " in all_said("plan", serials), bad
     mine = recipe_file(tmp_path, ('"consumer"', '"mine.toml"'), name="limits.toml")
-    assert "no file and no built-in limits are called 'mine.toml'" in planned(mine)[1]
+    assert "no file and no built-in limits are called 'mine.toml'" in all_said("plan", mine)
     (tmp_path / "mine.toml").write_text('name = "m"\n[figures.residual_rms]\nmax = 1\nunit = "µg"\n', encoding="utf-8")
-    assert "unknown figure 'residual_rms'" in planned(mine)[1]
+    assert "unknown figure 'residual_rms'" in all_said("plan", mine)
     with pytest.raises(
         RecipeInvalid, match=r"found 'my recipe'.* a to z, digits and . _ - are needed, a letter or digit first"
     ):
         load_recipe(recipe_file(tmp_path, ('"small"', '"my recipe"'), name="name.toml"))
     dwells = tmp_path / "dwells.csv"
     dwells.write_text(DWELL + "A1,0,0,0,0,1,0.01,oops,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n", encoding="utf-8")
-    assert "column out_y: found oops, a finite number is needed" in refused("inspect", dwells)
-    assert f"tumbleline compare {dwells}" in refused("fit", dwells)
+    assert "column out_y: found oops, a finite number is needed" in all_said("inspect", dwells)
+    assert f"tumbleline compare {dwells}" in all_said("fit", dwells)
 
 
 def test_numbers_have_three_digits_and_no_exponent() -> None:

@@ -83,16 +83,21 @@ def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch:
     assert client.get("/discover/levels-D7.csv").status_code == 422
 
 
-def test_the_page_of_a_run_has_the_verdict_of_its_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = small_run(tmp_path)
-    read = Run.table
-    for verdict, reason, shown in (
-        ("adequate", "", 'verdict good">ADEQUATE: '), ("not adequate", "", 'verdict bad">NOT ADEQUATE: '),
+@pytest.mark.parametrize(
+    ("verdict", "reason", "shown"),
+    [
+        ("adequate", "", 'verdict good">ADEQUATE: '),
+        ("not adequate", "", 'verdict bad">NOT ADEQUATE: '),
         ("not judged", "too few dwells", 'verdict open">CANNOT BE JUDGED: too few dwells'),
-    ):  # fmt: skip
-        own = read(run, "verdict").assign(verdict=verdict, reason=reason)
-        monkeypatch.setattr(Run, "table", lambda self, name, own=own: own if name == "verdict" else read(self, name))
-        assert shown in client_of(run.archive.root, tmp_path).get(f"/run?run={run.id}").text
+    ],
+)
+def test_the_page_of_a_run_has_the_verdict_of_its_archive(
+    verdict: str, reason: str, shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, read = small_run(tmp_path), Run.table
+    own = run.table("verdict").assign(verdict=verdict, reason=reason)
+    monkeypatch.setattr(Run, "table", lambda self, name: own if name == "verdict" else read(self, name))
+    assert shown in client_of(run.archive.root, tmp_path).get(f"/run?run={run.id}").text
 
 
 def test_a_unit_has_figures_and_coefficients_with_u_once_and_residuals_against_what_they_depend_on(
