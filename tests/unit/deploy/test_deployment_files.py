@@ -79,7 +79,7 @@ def test_a_service_may_do_little_holds_no_key_and_writes_below_its_own_folders_o
         assert int(service["LimitNOFILE"][0]) >= 4 * MOST
 
 
-def test_the_worker_is_asked_to_stop_and_its_watchdog_has_time() -> None:
+def test_the_image_has_a_user_and_a_worker_and_its_watchdog_have_time_to_end() -> None:
     service = unit(WORKER)["Service"]
     assert "worker stop" in service["ExecStop"][0]
     minutes = re.fullmatch(r"(\d+)min", service["TimeoutStopSec"][0])
@@ -87,6 +87,13 @@ def test_the_worker_is_asked_to_stop_and_its_watchdog_has_time() -> None:
     assert 60 * int(minutes[1]) > 10 * SAFE_WITHIN_S
     assert float(re.search(r"--wait (\d+)", service["ExecStop"][0])[1]) < 60 * int(minutes[1])
     assert service["OOMPolicy"] == ["continue"]
+    assert re.findall(r"^USER (\S+)$", CONTAINERFILE, re.MULTILINE) == ["tumbleline"]
+    worker = SERVICES["worker"]
+    assert SERVICES["server"]["ports"] == ["127.0.0.1:4200:4200"]
+    assert "--with-healthcheck" in worker["entrypoint"]
+    assert worker["environment"]["PREFECT_WORKER_WEBSERVER_HOST"] == "127.0.0.1"
+    assert int(worker["stop_grace_period"].removesuffix("m")) * 60 > 10 * SAFE_WITHIN_S
+    assert "sh" not in worker["entrypoint"]  # it would not pass SIGTERM on
 
 
 def without_program(unit_file: Path) -> str:
@@ -135,16 +142,6 @@ def test_a_container_may_do_little_and_gets_the_key_as_a_secret(name: str) -> No
         assert "AUTH_STRING" not in str(service)
 
 
-def test_the_image_has_a_user_and_a_worker_listens_on_loopback_and_has_time_to_end() -> None:
-    assert re.findall(r"^USER (\S+)$", CONTAINERFILE, re.MULTILINE) == ["tumbleline"]
-    worker = SERVICES["worker"]
-    assert SERVICES["server"]["ports"] == ["127.0.0.1:4200:4200"]
-    assert "--with-healthcheck" in worker["entrypoint"]
-    assert worker["environment"]["PREFECT_WORKER_WEBSERVER_HOST"] == "127.0.0.1"
-    assert int(worker["stop_grace_period"].removesuffix("m")) * 60 > 10 * SAFE_WITHIN_S
-    assert "sh" not in worker["entrypoint"]  # it would not pass SIGTERM on
-
-
 def test_every_folder_that_a_container_writes_is_a_named_volume() -> None:
     places = dict(re.findall(r"(TUMBLELINE_ARCHIVE|TUMBLELINE_STATE|PREFECT_HOME)=(\S+)", CONTAINERFILE))
     mounted = {name: dict(v.split(":")[:2] for v in SERVICES[name].get("volumes", [])) for name in SERVICES}
@@ -159,7 +156,7 @@ def test_every_folder_that_a_container_writes_is_a_named_volume() -> None:
     assert {f"/var/lib/{folder}" for folder in made} == {place for own in mounted.values() for place in own.values()}
 
 
-def test_the_database_of_a_plant_is_an_image_by_digest_with_its_password_in_a_file() -> None:
+def test_images_have_a_digest_and_the_database_of_a_plant_its_password_in_a_file() -> None:
     database, server = PLANT["services"]["database"], PLANT["services"]["server"]
     assert re.fullmatch(r"docker\.io/library/postgres@\$\{POSTGRES_DIGEST:\?[^}]+\}", database["image"])
     assert database["user"] == "999:999"
@@ -168,9 +165,6 @@ def test_the_database_of_a_plant_is_an_image_by_digest_with_its_password_in_a_fi
     assert server["environment"]["TUMBLELINE_ORCHESTRATOR_DATABASE"] == "/run/secrets/prefect-database"
     assert set(PLANT["secrets"]) == {"postgres-password", "prefect-database"}
     assert set(PLANT["volumes"]) == {"database"}
-
-
-def test_the_base_image_has_a_digest_or_is_not_built() -> None:
     assert re.findall(r"^FROM (\S+)$", CONTAINERFILE, re.MULTILINE) == ["docker.io/library/python@${PYTHON_DIGEST}"]
     assert re.findall(r"^ARG (.*)$", CONTAINERFILE, re.MULTILINE) == ["PYTHON_DIGEST"]  # with no value of its own
     assert {service["build"]["args"]["PYTHON_DIGEST"].partition(":?")[0] for service in SERVICES.values()} == {
@@ -213,15 +207,12 @@ def lines() -> list[str]:
     return commands
 
 
-def test_every_start_of_a_server_or_worker_is_one_that_is_there() -> None:
+def test_every_start_of_a_server_or_worker_and_every_command_is_one_that_is_there() -> None:
     matches = [re.search(r"-m pipelines\.orchestrator\.(server|worker) ([^&]*)", text) for text in lines()]
     given = [(match[1], match[2].split()) for match in matches if match]
     assert [module for module, _ in given].count("worker") >= 4
     for module, arguments in given:
         {"server": server, "worker": worker}[module]._parser().parse_args(arguments)
-
-
-def test_every_command_of_the_product_is_one_that_is_there() -> None:
     matches = [re.search(r"(?:^|/)tumbleline ([a-z].*)", text) for text in lines()]
     given = [shlex.split(match[1]) for match in matches if match]
     assert {"station", "workbench", "archive", "doctor", "run"} >= {words[0] for words in given}

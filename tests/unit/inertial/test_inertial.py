@@ -75,7 +75,7 @@ def test_the_root_is_that_of_scipy(place: float, steep: float) -> None:
     assert root(rises, 1e-9, 1.0) == optimize.brentq(rises, 1e-9, 1.0)
 
 
-def test_roots_at_ends_and_at_jumps_are_found_and_without_a_change_of_sign_there_is_none() -> None:
+def test_the_root_is_found_at_ends_and_at_jumps_and_without_a_change_of_sign_there_is_none() -> None:
     assert [root(lambda x: x, *ends) for ends in ((0.0, 1.0), (-1.0, 0.0))] == [0.0, 0.0]
     assert root(lambda x: -1.0 if x < 0.3 else 1.0, 0.0, 1.0) == pytest.approx(0.3, abs=4e-12)
     with pytest.raises(ValueError, match="no change of sign"):
@@ -110,7 +110,9 @@ def directions(rng: np.random.Generator, *shape: int) -> np.ndarray:
     return f / np.linalg.norm(f, axis=-1, keepdims=True)
 
 
-def test_static_intervals_are_those_that_were_made(rng: np.random.Generator) -> None:
+def test_static_intervals_are_those_that_were_made_and_a_record_that_never_moves_is_one(
+    rng: np.random.Generator,
+) -> None:
     rate, still = 50.0, []
     parts = []
     for _ in range(8):
@@ -123,8 +125,5 @@ def test_static_intervals_are_those_that_were_made(rng: np.random.Generator) -> 
         for (start, length), a, b in zip(still, intervals.start, intervals.stop, strict=True):
             assert start <= a < start + 60
             assert start + length - 60 < b <= start + length
-
-
-def test_a_record_that_never_moves_is_one_interval(rng: np.random.Generator) -> None:
     intervals = find(rng.normal(size=(5000, 3)), 100.0)
     assert (intervals.start.tolist(), intervals.stop.tolist()) == ([0], [5000])

@@ -76,7 +76,7 @@ def lot_with(common: np.ndarray | float, own: np.ndarray | float = 0.0) -> Model
     return ExaminedRun(lot_of(measured(dwells, made.history), square=False), BASE).model()
 
 
-def test_a_course_that_units_share_is_no_random_walk_and_walks_are_no_course() -> None:
+def test_what_units_share_is_no_random_walk_walks_are_no_course_and_noise_of_single_dwells_follows_no_driver() -> None:
     n = len(make(World(units=4), SEED + 90).dwells) // 4
     rng = np.random.default_rng(SEED + 91)
     day = 80.0 * np.sin(np.linspace(0.0, 6.0 * np.pi, n))
@@ -90,10 +90,6 @@ def test_a_course_that_units_share_is_no_random_walk_and_walks_are_no_course() -
     walks = 40.0 / np.sqrt(n) * np.cumsum(rng.standard_normal((4, n, 3)), axis=1)
     model = lot_with(0.0, walks)
     assert curve_in_noise(model, suspects(model.problem)) is None
-
-
-def test_noise_of_single_dwells_that_units_share_follows_no_driver() -> None:
-    n = len(make(World(units=4), SEED + 90).dwells) // 4
     model = lot_with(60.0 * np.random.default_rng(SEED + 92).standard_normal(n))
     assert shared_noise(model) > 3.0
     assert curve_in_noise(model, suspects(model.problem)) is None

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from made_worlds import BASE, HIDDEN, NULLS, Noise, World, lot_in, make
 from scipy import integrate, stats
 
@@ -76,19 +77,16 @@ def test_a_dwell_far_off_in_normal_noise_is_named(dwells, deviations, runs, monk
     assert hits >= min(0.95 * runs, runs - 1)
 
 
-def test_two_bad_dwells_do_not_pass_for_the_tails_of_each_other(monkeypatch):
+def test_two_bad_dwells_are_no_tails_of_each_other_and_one_axis_at_six_deviations_is_not_named(monkeypatch):
     values = drawn(0.0, 576, np.random.default_rng(9))
     values[5], values[80] = [20.0, -15.0, 20.0], [0.0, 25.0, -20.0]
     assert sorted(named(values, monkeypatch)) == [5, 80]
-
-
-def test_one_axis_alone_at_six_deviations_is_left_out_and_not_named(monkeypatch):
     values = drawn(0.0, 72, np.random.default_rng(10))
     values[5] = [6.3, 0.2, -0.4]
     assert named(values, monkeypatch) == []
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", mostly_slow(range(6), 0, 1))
 def test_scatter_that_follows_the_temperature_is_not_quantised(seed: int) -> None:
     made = make(World(noise=Noise(white=150.0, flicker=10.0)), 5_800_000 + seed)
     dwells = made.dwells.copy()
@@ -145,7 +143,7 @@ def test_a_pose_that_is_off_has_two_columns_across_its_force(*, stated: bool) ->
         )  # seats of their own: a pose is no direction of all
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", mostly_slow(range(3), 0))
 def test_a_sensor_that_follows_the_temperature_has_no_spikes(seed: int) -> None:
     made = make(World(units=4, soaks=(25.0, 26.0, -10.0, 24.0)), 6_300_060 + seed)
     dwells = made.dwells.drop(columns=["sd_x", "sd_y", "sd_z", "n"])

@@ -166,10 +166,12 @@ def test_parts_of_a_turn_of_unequal_length_are_no_noise() -> None:
     assert 0.7 < made.fit.chi_square / made.fit.dof < 1.35
 
 
-def test_planes_that_leave_an_axis_still_are_refused() -> None:
+def test_planes_that_leave_an_axis_still_and_too_few_readings_are_refused() -> None:
     points = rotations(planes=["xy"])
     with pytest.raises(NotIdentified, match="turn another plane"):
         diagnose_rotation(data(points, true_output(points), np.random.default_rng(5)))
+    with pytest.raises(NotIdentified, match="readings of the encoder"):
+        fit_sweep(np.arange(20.0), np.arange(20.0), 0.0, 2.0 * np.pi)
 
 
 def test_uncertainties_hold_in_coloured_noise() -> None:
@@ -248,11 +250,6 @@ def test_a_record_of_turns_gives_rate_ripple_and_standing_times() -> None:
     rate, acceleration = sweeps[0].motion(at)
     assert rate[1:-1] == pytest.approx(np.gradient(sweeps[0].angle(at), at)[1:-1], rel=1e-3)
     assert acceleration[1:-1] == pytest.approx(np.gradient(rate, at)[1:-1], abs=2e-2 * np.abs(acceleration).max())
-
-
-def test_too_few_readings_are_refused() -> None:
-    with pytest.raises(NotIdentified, match="readings of the encoder"):
-        fit_sweep(np.arange(20.0), np.arange(20.0), 0.0, 2.0 * np.pi)
 
 
 def test_a_later_table_is_farther_along_its_turn() -> None:

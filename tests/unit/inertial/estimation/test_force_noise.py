@@ -47,11 +47,8 @@ def test_an_effect_is_no_noise(name):
     assert by_force(run_of(HIDDEN[name], SEED).model()) is None
 
 
-def test_louder_soaks_are_no_louder_forces():
+def test_louder_soaks_are_no_louder_forces_and_poses_without_a_repetition_tell_nothing():
     assert by_force(run_of(NOISES["hot_x4"], SEED).model()) is None
-
-
-def test_poses_without_a_repetition_tell_nothing():
     run = run_of(World(soaks=(25.0,), noise=Noise(white=10.0, flicker=5.0)), SEED)
     noisier(run, 2.0, 40.0)
     assert by_force(run.model()) is None

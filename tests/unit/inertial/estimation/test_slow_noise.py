@@ -23,19 +23,12 @@ def _errors(rng: np.random.Generator, noise: str, seconds: float) -> tuple[float
     return float(samples.mean(axis=1).std()), float(np.sqrt(np.mean(told**2))), float(plain)
 
 
-def test_white_noise_is_told_as_it_is(rng: np.random.Generator) -> None:
+def test_white_noise_is_told_as_it_is_a_vibration_averages_out_and_a_breath_does_not(rng: np.random.Generator) -> None:
     true, told, plain = _errors(rng, "white", 6.0)
     np.testing.assert_allclose([told, plain], true, rtol=0.12)
-
-
-def test_a_vibration_averages_out_and_what_leaks_of_it_counts(rng: np.random.Generator) -> None:
     true, told, plain = _errors(rng, "engine", 5.03)
     assert plain > 5.0 * true
     np.testing.assert_allclose(told, true, rtol=0.25)
-
-
-def test_a_breath_does_not(rng: np.random.Generator) -> None:
-    """Of two breaths in a dwell the lines next to the mean hold more than it does; of eight they hold as much."""
     true, told, plain = _errors(rng, "breath", 7.0)
     assert plain < 0.6 * true
     assert true < told < 3.0 * true

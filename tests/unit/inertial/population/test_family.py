@@ -30,12 +30,9 @@ def family() -> Family:
     return family_of(*calibrations(np.random.default_rng(8), 150, 6))
 
 
-def test_the_errors_of_the_calibrations_are_not_in_the_spread_of_the_units(family: Family) -> None:
+def test_spreads_of_units_and_of_lots_are_told_apart_without_the_errors_of_the_calibrations(family: Family) -> None:
     np.testing.assert_allclose(family.unit, np.stack([WITHIN] * AXES), rtol=0.25, atol=0.35)
     assert np.all(np.abs(family.mean - MEAN) < 4.0 * np.sqrt(np.diagonal(family.error, axis1=-2, axis2=-1)))
-
-
-def test_a_spread_between_lots_is_told_from_one_inside_them(family: Family) -> None:
     between = np.diagonal(family.lot, axis1=-2, axis2=-1)
     assert between[:, 0] == pytest.approx(2.0, rel=0.5)
     assert np.all(between[:, 1:] < [0.3, 0.1])
@@ -53,14 +50,11 @@ def test_it_is_the_analysis_of_variance_where_all_errors_are_alike() -> None:
     np.testing.assert_allclose(np.diagonal(family.lot, axis1=-2, axis2=-1)[:, 0], (lots - inside)[:, 0] / 8, rtol=0.05)
 
 
-def test_the_unit_of_the_output_does_not_matter() -> None:
+def test_the_unit_of_the_output_does_not_matter_and_a_small_family_predicts_with_a_wider_covariance() -> None:
     values, error, lot = calibrations(np.random.default_rng(4), 20, 4)
     one, other = family_of(values, error, lot), family_of(1e6 * values, 1e12 * error, lot)
     np.testing.assert_allclose(other.unit, 1e12 * one.unit, rtol=1e-6)
     np.testing.assert_allclose(other.precision, 1e-12 * one.precision, rtol=1e-6)
-
-
-def test_a_small_family_predicts_with_a_wider_covariance() -> None:
     values, error, lot = calibrations(np.random.default_rng(4), 9, 4)
     family = family_of(values, error, lot)
     assert family.within == pytest.approx(27.0 / 23.0 * family.unit)

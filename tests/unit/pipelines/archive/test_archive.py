@@ -51,8 +51,8 @@ def test_leaves_nothing_under_a_temporary_name_and_names_a_folder_that_cannot_be
         Archive(tmp_path / "a" / "archive").prepare()
 
 
-def test_a_manifest_says_from_what_by_whom_and_with_what_and_a_key_depends_on_inputs_parameters_and_code(
-    run: Run,
+def test_a_manifest_says_from_what_and_with_what_its_key_depends_on_that_and_a_finished_run_is_not_computed_again(
+    run: Run, tmp_path: Path
 ) -> None:
     manifest = run.manifest("coefficients")
     assert manifest["inputs"] == {name: run.manifest(name)["sha256"] for name in ("dwells", "history")}
@@ -69,9 +69,6 @@ def test_a_manifest_says_from_what_by_whom_and_with_what_and_a_key_depends_on_in
     ]
     assert len(set(keys)) == 4
     assert stage_key("fit", {"dwells": "1"}, {"effects": ["bias"]}, "code") == keys[0]
-
-
-def test_a_finished_run_is_not_computed_again(run: Run, tmp_path: Path) -> None:
     job = small_job(tmp_path)
     again = Runner(job, run.archive, measure=_never)
     assert again.run.id == run.id
@@ -121,7 +118,7 @@ def test_one_process_at_a_time_measures_a_lot(tmp_path: Path) -> None:
         list(Runner(job, archive, measure=second).all())
 
 
-def test_a_key_takes_in_what_its_stage_uses_by_name_or_by_discovery_and_nothing_of_others() -> None:
+def test_a_key_takes_in_the_sources_of_what_its_stage_uses_and_imports_none_of_them() -> None:
     assert not {n for n in sources(CODE["grade"]) if n.startswith("inertial.criticism")}
     assert "inertial.fits.wander" not in sources(CODE["reduce"])
     assert {"inertial.effects.third_order", "inertial.effects.covariate"} <= set(sources(CODE["fit"]))
@@ -131,18 +128,12 @@ def test_a_key_takes_in_what_its_stage_uses_by_name_or_by_discovery_and_nothing_
     for name in ("inertial.no_such_module", "no_such_package", "inertial.counts.number_of"):
         with pytest.raises(LookupError, match=name):
             sources((name,))
-
-
-def test_every_source_is_that_of_the_module_of_its_name():
     found = sources(("inertial", "schemas", "stations", "pipelines"))
     assert len(found) > 900
     for name in [*found][::9]:
         spec = find_spec(name)
         assert spec is not None, name
         assert found[name] == Path(spec.origin or ""), name
-
-
-def test_no_module_is_imported_for_its_source():
     code = (
         "import sys; from pipelines.archive.keys import code_hash; before = set(sys.modules); "
         "code_hash('report'); print(*(set(sys.modules) - before))"

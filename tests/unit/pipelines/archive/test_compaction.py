@@ -80,15 +80,12 @@ def test_open_and_unfinished_runs_are_left_alone(archive: Archive) -> None:
     assert (Path(str(run.path)) / "run.json").stat().st_size
 
 
-def test_finished_command_finds_its_packed_run(archive: Archive) -> None:
+def test_a_finished_command_finds_its_packed_run_and_the_next_event_follows_the_packed_ones(archive: Archive) -> None:
     compact(archive)
     before = single(archive)
     again = small_run(Path(str(archive.root)).parent)
     assert again.id == archive.run("latest").id
     assert {p.suffix for p in set(single(archive)) - set(before)} <= {".html", ".json"}
-
-
-def test_next_event_follows_the_packed_ones(archive: Archive) -> None:
     compact(archive)
     serial = archive.run("latest").about["lot"]["units"][0]["serial"]
     ledger = Ledger(archive)

@@ -50,17 +50,13 @@ def test_one_serial_on_two_kinds_or_stations_within_minutes_is_two_units_and_on_
     assert twice(again) == {}
 
 
-def test_exchanged_serials_are_told_among_four_units_too(rng: np.random.Generator) -> None:
+def test_exchanged_serials_are_told_among_four_units_and_no_change_of_a_unit_is(rng: np.random.Generator) -> None:
     rows = [(unit, "ADXL355", "s", day) for unit in "ABCD" for day in (0.0, 180.0)]
     own = 5000.0 * rng.standard_normal((4, len(NAMES)))
     values = np.repeat(own, 2, axis=0) + 0.1 * rng.standard_normal((8, len(NAMES)))
     values[[1, 5]] = values[[5, 1]]  # A and C on the second day
     strange = strangers(calibrations(*rows, values=values), RULES)
     assert [(one.row, one.looks_like, one.exchanged) for one in strange] == [(1, "C", True), (5, "A", True)]
-
-
-def test_among_few_units_one_that_changed_is_not_called_exchanged(rng: np.random.Generator) -> None:
-    rows = [(unit, "ADXL355", "s", day) for unit in "ABCD" for day in (0.0, 180.0)]
     values = np.repeat(5000.0 * rng.standard_normal((4, len(NAMES))), 2, axis=0)
     values[1] += 9000.0
     values[5] -= 9000.0

@@ -4,11 +4,10 @@ from pathlib import Path
 
 import pytest
 from capture_double import CaptureDouble, measured_run, small_job
-from typer.testing import CliRunner
+from in_process import text_of
 
 from pipelines.archive import Archive, Run
 from pipelines.capture.interruptions import interruptions
-from pipelines.cli import app
 from pipelines.cli.summary import summary
 from pipelines.report import render
 from schemas.event import Event
@@ -39,23 +38,22 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return measured_run(small_job(folder), Archive(folder / "archive"), Interrupted())
 
 
-def test_an_opened_door_pauses_and_repeated_dwells_are_in_the_result(run: Run) -> None:
+def test_an_opened_door_pauses_and_repeated_dwells_are_in_the_result_on_the_report_and_at_the_terminal(
+    run: Run,
+) -> None:
     interrupted = summary(run)["interruptions"]
     assert (interrupted["door_opened"], interrupted["pauses"], interrupted["paused_s"]) == (2, 3, 90.0 + 120.0)
     [dwell] = interrupted["repeated_dwells"]
     assert (dwell["record"], dwell["times"], dwell["reasons"]) == (1, 2, [DOOR, DOOR])
     assert dwell["pose"] == run.table("readings").set_index("record")["pose"].loc[1].iloc[0]
     assert [event["kind"] for event in interrupted["events"]] == ["spoilt", "resumed", "spoilt", "resumed", "suspended"]
-
-
-def test_they_are_on_the_report_and_on_the_terminal(run: Run) -> None:
     page = render(run)
     assert "Interruptions at the station" in page
     assert "Door opened: 2" in page
     assert page.count(BACK) == 2
-    shown = CliRunner().invoke(app, ["show", run.id, "--archive", str(run.archive.root)])
-    assert "3 pauses (3.5 min waited), the door was opened 2 times" in shown.stdout
-    assert "measured again 2 times" in shown.stdout
+    shown = text_of("show", run.id, "--archive", run.archive.root)
+    assert "3 pauses (3.5 min waited), the door was opened 2 times" in shown
+    assert "measured again 2 times" in shown
 
 
 def test_a_run_without_any_says_so_and_one_that_did_not_note_them_says_that(run: Run) -> None:

@@ -1,8 +1,6 @@
 """The ledger of calibrations: certified, superseded, revoked; no two of a unit on one day."""
 
 import hashlib
-import json
-import shutil
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -12,26 +10,20 @@ from capture_double import small_run
 from each import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from in_process import document_of, refused
+from in_process import given as asked
 from ledger_events import day, event
-from typer.testing import CliRunner
 
-from pipelines.archive import Archive, Run
+from pipelines.archive import Run
 from pipelines.certificates import Ledger, LedgerEntry
 from pipelines.certificates.days import day_of, months_after
 from pipelines.certificates.validity import calibrations_of, overlapped
-from pipelines.cli import app
 from schemas.errors import ArchiveUnusable, WrongUse
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return small_run(tmp_path_factory.mktemp("ledger"), {"A3": "silent"})
-
-
 @pytest.fixture
-def run(made: Run, tmp_path: Path) -> Run:
-    shutil.copytree(made.archive.root, tmp_path / "archive")
-    return Archive(tmp_path / "archive").run(made.id)
+def run(tmp_path: Path) -> Run:
+    return small_run(tmp_path, {"A3": "silent"})
 
 
 @pytest.fixture
@@ -45,18 +37,15 @@ def ledger(tmp_path: Path) -> Ledger:
 NEXT = {"start": "2026-10-01", "until": "2027-10-01", "run": "r-2"}
 
 
-def test_a_calibration_holds_from_its_first_day_to_before_its_last_and_is_written_once(ledger: Ledger) -> None:
+def test_a_calibration_holds_from_its_first_day_is_written_once_and_ends_where_the_next_begins(
+    ledger: Ledger, tmp_path: Path
+) -> None:
     days = ("2025-12-31", "2026-01-01", "2026-12-31", "2027-01-01")
     held = [ledger.valid_at("A1", one) for one in days]
     assert [one and one.certificate for one in held] == [None, "A1/1", "A1/1", None]
     again, there = ledger.add(event())
     assert there
     assert [again] == ledger.events("A1")
-
-
-def test_a_new_calibration_ends_the_one_before_where_it_begins_and_names_it_by_its_hash(
-    ledger: Ledger, tmp_path: Path
-) -> None:
     ledger.add(event(**NEXT))
     assert [e.action for e in ledger.events("A1")] == ["certify", "supersede"]
     assert ledger.valid_at("A1", "2026-09-30").run == "r-1"
@@ -82,18 +71,7 @@ def test_one_that_begins_before_a_valid_one_is_refused_unless_it_supersedes(tmp_
     assert ledger.valid_at("A1", "2026-07-01").run == "r-2"
 
 
-def test_what_is_revoked_holds_on_no_day_or_from_the_day_named(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    ledger.add(event(until="2099-01-01"))
-    ledger.revoke("A1", "fell to the floor", day="2026-05-05")
-    assert ledger.valid_at("A1", "2026-05-04").certificate == "A1/1"
-    assert ledger.valid_at("A1", "2026-05-05") is None
-    ledger.revoke("A1", "the reference was wrong", certificate=1)
-    assert ledger.valid_at("A1", "2026-05-04") is None
-    assert [e.reason for e in ledger.events("A1")][1:] == ["fell to the floor", "the reference was wrong"]
-
-
-def test_a_revocation_needs_a_reason_and_something_that_holds(tmp_path: Path) -> None:
+def test_what_is_revoked_holds_on_no_day_or_from_the_day_named_and_needs_a_reason(tmp_path: Path) -> None:
     ledger = Ledger(tmp_path)
     with pytest.raises(WrongUse, match="no reason is given"):
         ledger.revoke("A1", " ")
@@ -102,6 +80,13 @@ def test_a_revocation_needs_a_reason_and_something_that_holds(tmp_path: Path) ->
     ledger.add(event(until="2099-01-01"))
     with pytest.raises(WrongUse, match=r"there is no certificate A1/7 that still holds; there are A1/1"):
         ledger.revoke("A1", "why", certificate=7)
+    ledger.add(event(until="2099-01-01"))
+    ledger.revoke("A1", "fell to the floor", day="2026-05-05")
+    assert ledger.valid_at("A1", "2026-05-04").certificate == "A1/1"
+    assert ledger.valid_at("A1", "2026-05-05") is None
+    ledger.revoke("A1", "the reference was wrong", certificate=1)
+    assert ledger.valid_at("A1", "2026-05-04") is None
+    assert [e.reason for e in ledger.events("A1")][1:] == ["fell to the floor", "the reference was wrong"]
 
 
 def test_what_was_known_on_a_day_is_told_without_what_was_written_later_by_a_sound_clock(tmp_path: Path) -> None:
@@ -176,42 +161,24 @@ def test_a_day_is_that_of_utc_and_months_end_on_the_last_day_where_there_is_no_s
     assert months_after("2026-01-15", 12) == "2027-01-15"
 
 
-def ask(run: Run, *arguments: str) -> tuple[int, dict]:
-    result = CliRunner().invoke(app, [*arguments, "--archive", str(run.archive.root), "--json"])
-    if result.exception and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result.exit_code, json.loads(result.stdout)
-
-
-def test_only_units_that_passed_are_certified_and_the_others_are_named(run: Run) -> None:
-    status, document = ask(run, "certificate", "issue", run.id)
-    assert status == 1
+def test_units_that_passed_are_certified_and_show_tells_the_calibration_of_a_date_with_origin_and_end(run: Run) -> None:
+    own = ("--archive", run.archive.root)
+    document = document_of("certificate", "issue", run.id, *own, status=1)
     assert {one["serial"] for one in document["certified"]} == {"A1", "A2"}
     assert list(document["left_out"]) == ["A3"]
-    with pytest.raises(WrongUse, match=r"unit A3 of run .* did not pass"):
-        ask(run, "certificate", "issue", run.id, "--units", "A3")
-
-
-def test_show_tells_the_calibration_of_a_date_with_its_coefficients_origin_and_end(run: Run) -> None:
-    ask(run, "certificate", "issue", run.id, "--units", "A1,A2")
-    status, shown = ask(run, "show", "A1", "--at", day(100))
+    assert f"unit A3 of run {run.id} did not pass" in refused("certificate", "issue", run.id, "--units", "A3", *own)
+    shown = document_of("show", "A1", "--at", day(100), *own, status=0)
     calibration = shown["calibration"]
-    assert (status, shown["valid"], calibration["run"]) == (0, True, run.id)
+    assert (shown["valid"], calibration["run"]) == (True, run.id)
     wanted = run.table("coefficients").query("unit == 'A1'")
     assert [row["value"] for row in calibration["coefficients"]] == wanted["value"].tolist()
     assert calibration["made"]["code"] == run.manifest("coefficients")["code"]
     assert calibration["made"]["capture"] == run.about["capture"]
-    status, shown = ask(run, "show", "A1", "--at", day(-1))
-    assert (status, shown["valid"], shown["calibration"]) == (1, False, None)
-    shown = CliRunner().invoke(app, ["show", "A1", "--at", "2060-01-01", "--archive", str(run.archive.root)])
-    assert (shown.exit_code, "expired" in shown.stdout, " valid " in shown.stdout.partition("\n")[2]) == (
-        1,
-        True,
-        False,
-    )
-    ask(run, "revoke", "A2", "--reason", "returned damaged")
-    status, shown = ask(run, "show", "A2", "--at", day(100))
-    last = shown["history"][-1]
-    assert (status, last["state"], last["ended"]["reason"]) == (1, "revoked", "returned damaged")
-    with pytest.raises(WrongUse, match="unit 'B7' has no calibration in archive"):
-        ask(run, "show", "B7", "--at", "2026-01-01")
+    shown = document_of("show", "A1", "--at", day(-1), *own, status=1)
+    assert (shown["valid"], shown["calibration"]) == (False, None)
+    status, printed, _ = asked("show", "A1", "--at", "2060-01-01", *own)
+    assert (status, "expired" in printed, " valid " in printed.partition("\n")[2]) == (1, True, False)
+    document_of("certificate", "revoke", "A2", "--reason", "returned damaged", *own)
+    last = document_of("show", "A2", "--at", day(100), *own, status=1)["history"][-1]
+    assert (last["state"], last["ended"]["reason"]) == ("revoked", "returned damaged")
+    assert "unit 'B7' has no calibration in archive" in refused("show", "B7", "--at", "2026-01-01", *own)

@@ -41,7 +41,9 @@ def test_what_was_noted_is_what_the_files_tell(ledger: Ledger, tmp_path: Path) -
     assert told(tmp_path) == first
 
 
-def test_only_events_that_are_new_or_changed_are_read(ledger: Ledger, tmp_path: Path) -> None:
+def test_only_events_that_are_new_or_changed_are_read_and_those_that_are_gone_are_not_told(
+    ledger: Ledger, tmp_path: Path
+) -> None:
     told(tmp_path)
     ledger.revoke("A007", "dropped", day="2026-07-01")
     place = next((tmp_path / "calibrations").glob("*/*/000002.json"))
@@ -50,9 +52,6 @@ def test_only_events_that_are_new_or_changed_are_read(ledger: Ledger, tmp_path: 
     assert histories.read == 2
     assert sum(len(own) for own in histories.units) == 401
     assert sum("bench-2" in one for one in told(tmp_path)) == 1
-
-
-def test_events_that_are_gone_are_not_told_from_what_was_noted(ledger: Ledger, tmp_path: Path) -> None:
     told(tmp_path)
     shutil.rmtree(next((tmp_path / "calibrations").glob("*/*")))
     assert len(told(tmp_path)) == 199

@@ -5,14 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from each import each
+from in_process import given, refused, text_of
 from pydantic import ValidationError
 from root_process import ROOT
 from small_station import short_recipe
-from typer.testing import CliRunner
 
 from pipelines.archive import Run
 from pipelines.certificates.stated_budget import stated_budget
-from pipelines.cli import app
 from pipelines.jobs.job import job_of_run
 from pipelines.jobs.terms import refuse_contradictions
 from pipelines.schedule.steps import steps
@@ -158,17 +157,14 @@ def test_plan_refuses_a_limit_that_cannot_be_reached_and_says_where_nothing_is_s
     """A QA700 moves by 50 µg from one switch-on to the next: no recipe makes it a navigation part for a year."""
     recipe = (ROOT / "deploy" / "recipes" / "qa700.toml").read_text(encoding="utf-8")
     (tmp_path / "nav.toml").write_text(recipe.replace("qa700.limits.toml", "navigation"), encoding="utf-8")
-    planned = CliRunner().invoke(app, ["plan", str(tmp_path / "nav.toml")])
-    assert planned.exit_code == 1
     said = "the end of the period of validity: limit 50 µg, expected over 12 months"
-    assert said in planned.output.replace("\n", " ")
-    words = ["run", str(tmp_path / "nav.toml"), "--archive", str(tmp_path / "archive")]
-    assert isinstance(CliRunner().invoke(app, words).exception, RecipeInvalid)
+    assert said in text_of("plan", tmp_path / "nav.toml", status=1)
+    refused("run", tmp_path / "nav.toml", "--archive", tmp_path / "archive")
     assert not (tmp_path / "archive" / "captures").exists()
-    planned = CliRunner().invoke(app, ["plan", "--station", str(ROOT / "deploy" / "stations" / "simulated-awry.toml")])
-    assert (planned.exit_code, "noise only" in planned.output) == (1, True)
+    found, out, err = given("plan", "--station", ROOT / "deploy" / "stations" / "simulated-awry.toml")
+    assert (found, "noise only" in out) == (1, True)
     told = "refuses this recipe: limits production: bias_error_period_ug needs [stability] of the device, and [uncertainty]"
-    assert told in " ".join(planned.stderr.split())
+    assert told in " ".join(err.split())
 
 
 def test_what_a_certificate_states_is_of_one_unit(run: Run) -> None:

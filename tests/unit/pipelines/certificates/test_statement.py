@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from capture_double import small_run
 from ledger_events import day
 from typer.testing import Result
 
-from pipelines.archive import Archive, Run
+from pipelines.archive import Run
 from pipelines.certificates.days import months_after
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import change_from_options
@@ -21,16 +20,10 @@ from pipelines.rerun.rerun import again
 Typed = Callable[..., Result]
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A run without a report: ledger commands draw the report again only where there is one, which takes their time."""
-    return small_run(tmp_path_factory.mktemp("run"), {"A3": "silent"})
-
-
 @pytest.fixture
-def run(made: Run, tmp_path: Path) -> Run:
-    shutil.copytree(made.archive.root, tmp_path / "archive")
-    return Archive(tmp_path / "archive").run(made.id)
+def run(tmp_path: Path) -> Run:
+    """A run without a report: ledger commands draw the report again only where there is one, which takes their time."""
+    return small_run(tmp_path, {"A3": "silent"})
 
 
 def units(typed: Typed, run: Run, *words: str) -> dict[str, dict]:

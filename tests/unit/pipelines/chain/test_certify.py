@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,20 +39,12 @@ Typed = Callable[..., Result]
 LIMITS = 'name = "half"\nvalidity_months = 6\n[figures]\nresidual_rms_ug = {max = 5000.0, unit = "µg"}\n'
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(VARIABLE, "")
-        run = small_run(tmp_path_factory.mktemp("run"))
-        run.seal()
-    return run
-
-
 @pytest.fixture
-def run(made: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     monkeypatch.setenv(VARIABLE, "")
-    shutil.copytree(made.archive.root, tmp_path / "archive")
-    return Archive(tmp_path / "archive").run(made.id)
+    run = small_run(tmp_path)
+    run.seal()
+    return run
 
 
 def end_of(run: Run) -> str:
@@ -173,7 +164,9 @@ def test_a_certificate_is_offered_where_it_would_be_given(
     assert not offered(Ledger(run.archive.root / "other"), run)
 
 
-def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:
+def test_the_limits_file_says_how_long_within_bounds_and_stays_out_of_the_name_of_a_run_that_does_not_say(
+    run: Run, tmp_path: Path
+) -> None:
     (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
     new = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(tmp_path / "half.toml"))).new)
     assert allowed_months(new) == 6
@@ -182,9 +175,6 @@ def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match=r"no more than until .* is allowed; limits 'half' allow 6 months"):
         certify(ledger, new, months=7)
     assert certify(ledger, new).written[0].until == months_after(end_of(run), 6)
-
-
-def test_the_months_of_a_limits_file_are_bounded_and_stay_out_of_the_name_of_a_run_where_they_are_not_given() -> None:
     for months in ("0", "121", '"6"', "true", "6.5"):
         with pytest.raises(RecipeInvalid, match="validity_months"):
             parse_limits(LIMITS.replace("= 6", f"= {months}"), "half.toml", UNITS)
@@ -344,10 +334,9 @@ def restated(run: Run, **entries: object) -> Run:
      "gradient (dominates bias and scale over temperature)"),
 ])  # fmt: skip
 def test_an_entry_that_the_results_depend_on_is_asked_for_and_a_zero_is_none(
-    row: tuple[dict[str, object], str], made: Run, tmp_path: Path
+    row: tuple[dict[str, object], str], tmp_path: Path
 ) -> None:
-    shutil.copytree(made.archive.root, tmp_path / "archive")
-    own = Archive(tmp_path / "archive").run(made.id)
+    own = small_run(tmp_path)
     refuse_unstated(own)
     with pytest.raises(WrongUse, match="not stated: ") as refused:
         refuse_unstated(restated(own, **row[0]))

@@ -154,7 +154,9 @@ def ending(capsys: pytest.CaptureFixture[str], **changes: Any) -> str:
     return " ".join(capsys.readouterr().out.split())
 
 
-def test_an_effect_added_from_a_class_is_not_called_found(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_effect_that_stands_alone_is_found_and_one_of_a_class_is_separated_by_a_measurement_or_by_none(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     row = {
         "outer_deg": 0.0, "inner_deg": 90.0, "chamber_C": 25.0, "why": "aging_log | warm_up", "minutes": 12.0,
         "separation_before": 0.4, "separation_after": 60.0, "separation_if": {"aging_log": 60.0, "warm_up": 75.0},
@@ -168,16 +170,10 @@ def test_an_effect_added_from_a_class_is_not_called_found(capsys: pytest.Capture
     assert "The measurement that separates them:" in said
     assert "expected 60 if aging_log is true, 75 if warm_up is true; not separated from the first: thermal_lag" in said
     assert "Found." not in said
-
-
-def test_where_no_measurement_parts_the_class_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     assert "No measurement that the station can take is certain to separate them." in ending(capsys)
     words = {"why": "aging_log | warm_up: no steps of this station are certain to separate them; needed: a power cycle"}
     said = ending(capsys, next_measurements=[words | {"measurable": False}])
     assert "needed: a power cycle" in said
-
-
-def test_an_effect_that_stands_alone_is_found(capsys: pytest.CaptureFixture[str]) -> None:
     said = ending(capsys, classes=[["warm_up"]], told_apart=True, not_told_apart=[])
     assert "The diagnosis named warm_up. Found." in said
 

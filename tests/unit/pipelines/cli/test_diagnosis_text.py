@@ -1,14 +1,12 @@
 """Every verdict lists the dwells that carry it and what it is without them: in the text, in the document and on the page."""
 
-import json
 import sys
 from dataclasses import replace
 
 import pytest
+from in_process import document_of, text_of
 from root_process import ROOT
-from typer.testing import CliRunner
 
-from pipelines.cli import app
 from pipelines.cli.text.diagnosis_text import print_diagnosis
 
 sys.path.insert(0, str(ROOT / "benchmarks" / "worlds"))
@@ -35,8 +33,7 @@ def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, c
     made = make(world, SEED)
     made.dwells.to_parquet(tmp_path / "dwells.parquet")
     page = tmp_path / "page.html"
-    given = ["diagnose", str(tmp_path / "dwells.parquet"), "--output", str(page), "--json"]
-    document = json.loads(CliRunner().invoke(app, given).stdout)
+    document = document_of("diagnose", tmp_path / "dwells.parquet", "--output", page)
     (group,) = document["classes"]
     assert (group["scope"], name in group["effects"]) == (scope, True)
     assert document["influence"] == group["influence"]
@@ -70,7 +67,6 @@ def test_missing_dwells_are_told_in_the_report_and_at_the_terminal(tmp_path):
     table = table.drop(index=table.index[(table["unit"] == "W002") & table["dwell"].isin([4, 9])])
     table.to_parquet(tmp_path / "dwells.parquet")
     page = tmp_path / "page.html"
-    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "dwells.parquet"), "--output", str(page)])
     notice = "of 36 dwells of the lot are missing: W002 2 (4, 9); these units are judged by the others"
-    assert notice in " ".join(done.stdout.split())
+    assert notice in text_of("diagnose", tmp_path / "dwells.parquet", "--output", page)
     assert notice in page.read_text(encoding="utf-8")

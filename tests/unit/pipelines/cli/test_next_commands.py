@@ -40,7 +40,9 @@ def told(made: dict[str, Any], model: Path | None) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in lines]
 
 
-def test_an_improvement_that_goes_on_has_model_fresh_run_output_author_effects_and_dwells_left_out() -> None:
+def test_an_improvement_alternatives_and_a_refuted_effect_have_model_fresh_run_output_author_and_dwells_left_out() -> (
+    None
+):
     (words,) = told(document(), Path("model.toml"))
     assert words[:2] == ["improve", "dwells.csv"]
     assert has(words, ("--model", "model.toml", *TEMPERATURES, *ARCHIVE, *EFFECTS, *LEFT, *AGAIN, *KEPT))
@@ -49,9 +51,6 @@ def test_an_improvement_that_goes_on_has_model_fresh_run_output_author_effects_a
     added = document(added=["damp"], after={"recommended": ["third_order"]}, fresh="fresh run.csv", file="new.toml")
     (words,) = told(added, Path("model.toml"))
     assert has(words, ("--model", "new.toml"))  # the model that it has written
-
-
-def test_alternatives_and_a_refuted_effect_have_the_same_options() -> None:
     choice = {"added": False, "effect": "damp", "not_separated_from": ["third_order"]}
     for words, name in zip(told(document(choices=[choice]), Path("m.toml")), ("damp", "third_order"), strict=True):
         assert has(words, ("--effect", name, "--model", "m.toml", *AGAIN, *KEPT))

@@ -7,13 +7,13 @@ from typing import Any, cast
 import pytest
 from capture_double import recipe_file
 from each import each
+from in_process import given, text_of
 from root_process import ROOT
-from typer.testing import CliRunner
 
 from inertial.counts import size_text
 from inertial.planning.ranges import UnseenRange
 from pipelines.archive import Archive
-from pipelines.cli import app, flowing
+from pipelines.cli import flowing
 from pipelines.cli.text.demo_text import print_discovery_demo
 from pipelines.diagnosis.confirmation import fall_of
 from pipelines.jobs.job import Request
@@ -25,50 +25,46 @@ from schemas.station import StationConfig, load_station
 from schemas.toml_files import PATTERNS
 
 
-def refused(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """What a command says of what it was given, in one line."""
-    monkeypatch.chdir(folder)
-    done = CliRunner().invoke(app, words, env={"COLUMNS": "200"})
-    return " ".join(f"{done.output} {done.exception or ''}".split())
+def all_said(*words: object) -> str:
+    """Standard output and error of a command as one line."""
+    return " ".join(" ".join(given(*words)[1:]).split())
 
 
 def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     recipe = recipe_file(tmp_path)
-    assert "refuses" not in refused(["plan", recipe], tmp_path, monkeypatch)
+    assert "refuses" not in all_said("plan", recipe)
     hot = recipe_file(tmp_path, ("[0.0, 50.0]", "[0.0, 298.0]"), ('"consumer"', '"production"'), name="hot.toml")
-    said = refused(["plan", hot], tmp_path, monkeypatch)
+    assert given("plan", hot)[0] == 1  # a plan tells what a run refuses
+    said = all_said("plan", hot)
     assert "'tumbleline run' refuses this recipe" in said
     assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in said
-    assert CliRunner().invoke(app, ["plan", hot]).exit_code == 1  # a plan tells what a run refuses
     blind = recipe_file(
         tmp_path,
         ("verification = [[35.0, 15.0], [105.0, -100.0]]", "verification = []"),
         ("static_record_s = 30.0", "static_record_s = 0.0"),
         name="blind.toml",
     )
-    with pytest.raises(
-        RecipeInvalid, match=r"bias_error_ug\S* need verification poses; .* needs? a static record"
-    ) as by_run:
+    needed = r"bias_error_ug\S* need verification poses; .* needs? a static record"
+    with pytest.raises(RecipeInvalid, match=needed) as by_run:
         Request(blind).job(Archive(tmp_path / "archive"))
-    assert str(by_run.value) in refused(["plan", blind], tmp_path, monkeypatch)  # every limit, in the words of the run
+    assert str(by_run.value) in all_said("plan", blind)  # every limit, in the words of the run
     units = load_recipe(recipe).units
     for bad in ("LN 01", ""):
         serials = recipe_file(tmp_path, (f'"{units[0]}"', f'"{bad}"'), name="serials.toml")
-        said = refused(["plan", serials], tmp_path, monkeypatch)
-        assert "'tumbleline run' refuses this recipe: lot: " in said, bad
+        assert "'tumbleline run' refuses this recipe: lot: " in all_said("plan", serials), bad
     mine = recipe_file(tmp_path, ('"consumer"', '"mine.toml"'), name="limits.toml")
-    assert "no file and no built-in limits are called 'mine.toml'" in refused(["plan", mine], tmp_path, monkeypatch)
+    assert "no file and no built-in limits are called 'mine.toml'" in all_said("plan", mine)
     (tmp_path / "mine.toml").write_text('name = "m"\n[figures.residual_rms]\nmax = 1\nunit = "µg"\n', encoding="utf-8")
-    assert "unknown figure 'residual_rms'" in refused(["plan", mine], tmp_path, monkeypatch)
+    assert "unknown figure 'residual_rms'" in all_said("plan", mine)
     with pytest.raises(
         RecipeInvalid, match=r"found 'my recipe'.* a to z, digits and . _ - are needed, a letter or digit first"
     ):
         load_recipe(recipe_file(tmp_path, ('"small"', '"my recipe"'), name="name.toml"))
     dwells = tmp_path / "dwells.csv"
     dwells.write_text(DWELL + "A1,0,0,0,0,1,0.01,oops,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n", encoding="utf-8")
-    said = refused(["inspect", str(dwells)], tmp_path, monkeypatch)
-    assert "column out_y: found oops, a finite number is needed" in said
-    assert f"tumbleline compare {dwells}" in refused(["fit", str(dwells)], tmp_path, monkeypatch)
+    assert "column out_y: found oops, a finite number is needed" in all_said("inspect", dwells)
+    assert f"tumbleline compare {dwells}" in all_said("fit", dwells)
 
 
 def test_numbers_have_three_digits_and_no_exponent() -> None:
@@ -129,12 +125,11 @@ DWELL = "unit,dwell,time_s,force_x,force_y,force_z,out_x,out_y,out_z,humidity_pc
 def test_inspect_sends_dwells_in_the_exchange_format_to_diagnose(tmp_path: Path) -> None:
     path = tmp_path / "my dwells.csv"
     path.write_text(DWELL + "A1,0,0,0,0,1,0.01,0.02,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n", encoding="utf-8")
-    done = CliRunner().invoke(app, ["inspect", str(path)], env={"COLUMNS": "200"})
-    assert done.exit_code == 0
-    assert done.stdout.splitlines()[-1] == f"tumbleline diagnose '{path}'"
-    assert "1 unit, 2 dwells; reference: the force on each axis" in done.stdout
-    assert {"reference", "covariate"} <= set(done.stdout.split())
-    assert "--map" not in done.stdout
+    printed = text_of("inspect", path, status=0)
+    assert printed.endswith(f"tumbleline diagnose '{path}'")
+    assert "1 unit, 2 dwells; reference: the force on each axis" in printed
+    assert {"reference", "covariate"} <= set(printed.split())
+    assert "--map" not in printed
 
 
 def test_the_steps_of_a_demonstration_are_numbered_as_they_are_shown(capsys: pytest.CaptureFixture[str]) -> None:

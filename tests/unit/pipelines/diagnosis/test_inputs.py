@@ -1,16 +1,14 @@
 """What a judgement is made from: dwells left out, formulas; and the workbench, which judges as the command does."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
+from in_process import document_of
 
 from inertial import effects, poses
 from inertial.frames import force_from_angles
-from pipelines.cli import app
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.tables.leave_out import leave_out, named_dwells
 from pipelines.workbench.services import requests
@@ -69,7 +67,7 @@ def test_a_page_says_what_its_command_says(settings: WorkbenchSettings) -> None:
     assert state == "done"
     words = page.arguments()
     with effects.additions_forgotten():
-        told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+        told = document_of(*words)
     assert told["error"] == pytest.approx(outcome.document["error"])
     assert told["effects"] == outcome.document["effects"] == [*page.effects, "late"]
     assert told["classes"] == outcome.document["classes"]

@@ -48,7 +48,7 @@ def test_it_is_said_why_an_effect_is_recommended_or_not(row: tuple) -> None:
     assert why_recommended({"classes": [fault, effect], "recommended": recommended}) == lines
 
 
-def test_a_gain_in_density_does_not_confirm_an_error_that_rises() -> None:
+def test_a_gain_in_density_confirms_neither_an_error_that_rises_nor_a_fall_within_its_uncertainty() -> None:
     worse = confirmation._by_left_out(missed(1e-4, 100.0), missed(55e-4, 150.0))
     assert worse["confirmed"] is None
     assert worse["rises"].startswith("the error on dwells left out rises from 114 to 6")
@@ -56,9 +56,6 @@ def test_a_gain_in_density_does_not_confirm_an_error_that_rises() -> None:
     assert "rises from" in text_of(ROW, worse)
     better = confirmation._by_left_out(missed(1e-4, 100.0), missed(0.5e-4, 150.0))
     assert (better["confirmed"], better["rises"]) == (True, None)
-
-
-def test_a_fall_within_its_uncertainty_is_not_confirmed_by_a_gain_in_density() -> None:
     before = missed(1e-4, 100.0)
     once = before.missed["blocks of time"].copy()
     once[:, :5] *= 0.5  # one stretch of six has the whole fall

@@ -43,7 +43,9 @@ def test_a_changed_value_is_a_new_row_and_the_newest_counts(archive: Archive) ->
     assert "0 new values, 1 changed, 1 as before" in sentences(again)[0]
 
 
-def test_a_value_of_a_run_holds_for_its_units_unless_they_have_their_own(archive: Archive) -> None:
+def test_a_value_of_a_run_holds_for_its_units_unless_they_have_their_own_and_what_follows_from_a_result_is_not_taken(
+    archive: Archive,
+) -> None:
     add_attributes(archive, table("run,fixture r1,F1"), "run", "runs.csv")
     add_attributes(archive, table("serial,fixture A1,F2"), "serial", "units.csv")
     known = known_attributes(archive)
@@ -52,12 +54,9 @@ def test_a_value_of_a_run_holds_for_its_units_unless_they_have_their_own(archive
         "F1",
         "",
     )
-
-
-def test_what_follows_from_a_result_is_not_taken(archive: Archive) -> None:
     added = add_attributes(archive, table("serial,grade,wafer A1,pass,W1"), "serial", "a.csv")
     assert added["refused"] == ["grade"]
-    assert known_attributes(archive).names() == ["wafer"]
+    assert known_attributes(archive).names() == ["fixture", "wafer"]
 
 
 REFUSED = {

@@ -23,7 +23,9 @@ def lots(count: int, correlation: float) -> list[Calibration]:
     return made
 
 
-def test_a_pair_of_each_axis_is_told_by_its_names() -> None:
+def test_a_pair_of_each_axis_is_told_by_its_names_and_in_a_sentence_on_the_screen(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     rows = correlations(lots(120, 0.5))
     assert sorted(row["figure"] for row in rows) == ["bias K0 x", "bias K0 y", "bias K0 z"]
     for row in rows:
@@ -31,9 +33,6 @@ def test_a_pair_of_each_axis_is_told_by_its_names() -> None:
         assert row["detail"]["correlation"] == pytest.approx(0.5, abs=3.0 * row["detail"]["u"])
         assert row["detail"]["units"] == 960
     assert correlations(lots(120, 0.0)) == []
-
-
-def test_it_is_a_sentence_on_the_screen(capsys: pytest.CaptureFixture[str]) -> None:
     (row, *_) = correlations(lots(60, 0.7))
     document = {
         "pooled": {"lots": 60, "units": 480, "left_out": [], "from": None, "until": None}, "device": "DEMO", "model": [],

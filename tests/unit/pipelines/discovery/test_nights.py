@@ -105,7 +105,9 @@ def test_a_state_that_is_gone_or_edited_is_made_again(archive: Archive, caplog: 
         assert "was edited" in caplog.text
 
 
-def test_scores_that_were_edited_are_made_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_edited_scores_are_made_again_and_a_damaged_run_is_told_and_pooled_once_it_is_restored(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     archive = small_line(tmp_path)
     (file,) = (Path(str(archive.root)) / "discovery" / "scores").iterdir()
     data = bytearray(file.read_bytes())
@@ -117,9 +119,18 @@ def test_scores_that_were_edited_are_made_again(tmp_path: Path, caplog: pytest.L
     assert "was edited" in caplog.text
     assert source.score(1) == FEW
     assert len(DiscoveryArchive(archive).pooled()) == FEW
+    shutil.rmtree(Path(str(archive.root)) / "discovery")
+    table = next((Path(str(archive.root)) / "runs").iterdir()) / "dwells.parquet"
+    sound = table.read_bytes()
+    table.write_bytes(sound[:-50])
+    with caplog.at_level(logging.WARNING):
+        assert source.score(1) == FEW - 1
+    assert table.parent.name in caplog.text
+    table.write_bytes(sound)
+    assert DiscoveryArchive(archive).score(1) == 1
 
 
-def test_a_revoked_run_is_taken_out_from_that_night_on(archive: Archive) -> None:
+def test_a_revoked_run_is_taken_out_from_that_night_on_and_one_that_goes_on_is_not_judged_yet(archive: Archive) -> None:
     brought_up(DiscoveryArchive(archive))
     later = DiscoveryArchive(archive)
     gone = later.pooled()[10]
@@ -139,6 +150,9 @@ def test_a_revoked_run_is_taken_out_from_that_night_on(archive: Archive) -> None
     assert replayed.order == state.order
     assert {(a.driver, a.index) for a in replayed.alarms} == {(a.driver, a.index) for a in state.alarms}
     assert state.alarms
+    run = next((Path(str(archive.root)) / "runs").iterdir())
+    (run / "sealed.json").unlink()
+    assert run.name not in {info.id for info in DiscoveryArchive(archive).infos}
 
 
 def test_attributes_that_come_later_start_with_the_lots_after_them(archive: Archive) -> None:
@@ -197,7 +211,9 @@ def told(
     return " ".join([*(row["id"] for row in rows), "new", *document["new"]])
 
 
-def test_what_is_unexplained_is_new_once_and_keeps_its_id_when_it_has_a_name(archive: Archive) -> None:
+def test_what_is_unexplained_is_new_once_and_keeps_its_id_when_it_has_a_name_and_that_of_an_earlier_version(
+    archive: Archive,
+) -> None:
     source = DiscoveryArchive(archive)
     # a look at a part, as with --model, --since or --explain, leaves what is new to the night
     assert told(source, 40, {}, ("wafer",), keep=False) == "D1 new D1"
@@ -209,17 +225,15 @@ def test_what_is_unexplained_is_new_once_and_keeps_its_id_when_it_has_a_name(arc
     assert told(source, 140, {"magnetic": "slot", "second_order": "wafer"}, ()) == "D2 D3 new"
     # another effect by the same driver is another discovery
     assert told(source, 160, {"magnetic": "slot", "fifth_order": "wafer"}, ()) == "D2 D4 new D4"
-
-
-def test_discoveries_that_an_earlier_version_kept_have_their_ids(archive: Archive) -> None:
-    source = DiscoveryArchive(archive)
     row = {"id": "D7", "effects": ["third_order"], "driver": "wafer", "since": "2025-01-01", "lots_then": 31}
     kept = {"discoveries": [row], "alarms": ["wafer 1"], "lots": 40}
     files.publish(source.folder() / "found", derived.framed(json.dumps(kept).encode()))
     assert told(source, 40, {"third_order": "wafer"}, ("slot",)) == "D7 D8 new D8"
 
 
-def test_the_shares_of_all_hypotheses_add_up_to_the_probability_of_an_error(archive: Archive) -> None:
+def test_shares_of_hypotheses_add_up_to_the_probability_of_an_error_and_an_effect_is_held_back_with_its_axes(
+    archive: Archive,
+) -> None:
     """Of every night that a driver comes in; an effect of many columns takes no more than one of a single column."""
     state = brought_up(DiscoveryArchive(archive))
     state.generations["later"] = 1
@@ -230,10 +244,6 @@ def test_the_shares_of_all_hypotheses_add_up_to_the_probability_of_an_error(arch
         [*state.sensor.effects, *range(state.sensor.size - state.sensor.count)], np.exp(-state.needed("mean"))
     )
     assert of_effect == pytest.approx(of_effect[0])
-
-
-def test_an_effect_as_a_whole_is_held_back_with_the_axes_that_carry_it(archive: Archive) -> None:
-    state = brought_up(DiscoveryArchive(archive))
     sensor, sums = state.sensor, state.sensor.drivers["mean"]
     effect = state.columns.index(("third_order", 0))
     assert sensor.effects is not None
@@ -248,23 +258,3 @@ def test_an_effect_as_a_whole_is_held_back_with_the_axes_that_carry_it(archive: 
             patch.setattr(type(sensor), "guarded", np.zeros(sensor.count, dtype=bool))
             assert held(state, alarm) is is_held
             assert held(state, replace(alarm, index=int(axes[1])))
-
-
-def test_a_damaged_run_is_told_and_pooled_once_it_is_restored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    archive = small_line(tmp_path)
-    shutil.rmtree(Path(str(archive.root)) / "discovery")
-    table = next((Path(str(archive.root)) / "runs").iterdir()) / "dwells.parquet"
-    sound = table.read_bytes()
-    table.write_bytes(sound[:-50])
-    source = DiscoveryArchive(archive)
-    with caplog.at_level(logging.WARNING):
-        assert source.score(1) == FEW - 1
-    assert table.parent.name in caplog.text
-    table.write_bytes(sound)
-    assert DiscoveryArchive(archive).score(1) == 1
-
-
-def test_a_run_that_goes_on_is_not_judged_yet(archive: Archive) -> None:
-    run = next((Path(str(archive.root)) / "runs").iterdir())
-    (run / "sealed.json").unlink()
-    assert run.name not in {info.id for info in DiscoveryArchive(archive).infos}

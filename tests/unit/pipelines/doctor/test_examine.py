@@ -20,13 +20,12 @@ from pathlib import Path
 
 import pytest
 from each import each
+from in_process import document_of, text_of
 from s3_server import CREDENTIALS, s3_bucket
 from served_station import modbus_station, moves_ordered, served_plant, station_file
-from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.archive.signatures import make_key
-from pipelines.cli import app
 from pipelines.doctor import examine as host
 from pipelines.doctor import software
 from pipelines.doctor.archive import archive_checks, key_checks
@@ -181,7 +180,12 @@ def test_an_object_store_is_written_to_timed_and_left_as_it_was(monkeypatch: pyt
     assert only_fault(archive_checks(address, 1.0)).check == "reachable"  # the server is down now
 
 
-def test_a_key_is_private_and_outside_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_key_is_usable_private_and_outside_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TUMBLELINE_SIGNING_KEY", str(tmp_path / "k"))
+    assert only_fault(key_checks(None)).check == "present"
+    (tmp_path / "k").write_bytes(b"no key")
+    assert only_fault(key_checks(None)).check == "present"
+    monkeypatch.delenv("TUMBLELINE_SIGNING_KEY")
     archive_in(tmp_path / "a")
     assert states(key_checks(str(tmp_path / "a"))) == {"present": "warning"}
     key = tmp_path / "keys" / "signing.key"
@@ -194,13 +198,6 @@ def test_a_key_is_private_and_outside_the_archive(tmp_path: Path, monkeypatch: p
     make_key(inside)
     monkeypatch.setenv("TUMBLELINE_SIGNING_KEY", str(inside))
     assert only_fault(key_checks(str(tmp_path / "a"))).check == "outside the archive"
-
-
-def test_a_key_that_cannot_be_used_is_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TUMBLELINE_SIGNING_KEY", str(tmp_path / "k"))
-    assert only_fault(key_checks(None)).check == "present"
-    (tmp_path / "k").write_bytes(b"no key")
-    assert only_fault(key_checks(None)).check == "present"
 
 
 # the orchestrator
@@ -272,7 +269,7 @@ def free_port() -> int:
         return free.getsockname()[1]
 
 
-def test_a_server_that_is_down_and_an_address_that_is_none_are_faults_and_no_address_is_not(
+def test_an_address_is_a_fault_where_it_is_none_or_nobody_answers_there_and_none_is_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert states(orchestrator_checks()) == {"address": "not configured"}
@@ -316,14 +313,13 @@ def test_a_station_that_does_not_answer_or_whose_file_is_wrong_is_a_fault_and_no
 # the host and its software
 
 
-def test_the_clock_is_what_the_kernel_says(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_clock_is_what_the_kernel_says_and_a_difference_the_least_that_is_sure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert host.clock_state() in {None, 0, 1, 2, 3, 4, 5}
     for state, found in ((0, "good"), (5, "warning"), (None, "not configured")):
         monkeypatch.setattr(host, "clock_state", lambda state=state: state)
         assert states(host_checks())["synchronised"] == found
-
-
-def test_a_difference_of_clocks_is_the_least_that_is_sure() -> None:
     assert offset(100.0, 99.0, 101.0, 0.0) == 0.0
     assert offset(98.5, 99.0, 101.0, 1.0) == 0.0
     assert offset(90.0, 99.0, 101.0, 1.0) == -8.0
@@ -371,12 +367,10 @@ def test_a_library_that_is_missing_or_of_another_version_is_named(
 
 
 def test_the_command_says_the_remedy_and_leaves_with_its_status(tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["doctor", "--archive", str(tmp_path / "none")], env={"COLUMNS": "160"})
-    assert result.exit_code == 1
-    assert "fault: archive, reachable: " in result.stdout
-    assert "mount its disk or correct the address" in " ".join(result.stdout.split())
+    printed = text_of("doctor", "--archive", tmp_path / "none", status=1)
+    assert "fault: archive, reachable: " in printed
+    assert "mount its disk or correct the address" in printed
     archive_in(tmp_path / "a")
-    result = CliRunner().invoke(app, ["doctor", "--archive", str(tmp_path / "a"), "--free-gb", "0", "--json"])
-    document = json.loads(result.stdout)
-    assert (result.exit_code, document["ok"], document["faults"]) == (0, True, 0)
+    document = document_of("doctor", "--archive", tmp_path / "a", "--free-gb", "0", status=0)
+    assert (document["ok"], document["faults"]) == (True, 0)
     assert Path(document["samples"], "recipes", "line-six.toml").is_file()

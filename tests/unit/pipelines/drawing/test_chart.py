@@ -111,19 +111,17 @@ def contrast(one: str, other: str) -> float:
     return (max(light) + 0.05) / (min(light) + 0.05)
 
 
-@pytest.mark.parametrize("scale", [DIVERGING, SEQUENTIAL], ids=["diverging", "sequential"])
-def test_no_colour_of_a_scale_is_that_of_a_light_or_a_dark_page(scale: tuple[tuple[float, str], ...]) -> None:
-    for _, colour in scale:
+def test_no_colour_of_a_scale_is_that_of_a_page_and_one_colour_of_a_legend_means_one_thing() -> None:
+    for _, colour in (*DIVERGING, *SEQUENTIAL):
         for page in ("#ffffff", "#f4f6f8", "#22252a", "#1a2026"):
             assert contrast(colour, page) > 1.6, (colour, page)
-
-
-def test_one_colour_of_a_legend_means_one_thing() -> None:
     apart = ("x", "y", "z", "fourth", "before", "after", "muted", "ink", "good")
     assert len({ROLES[role] for role in apart}) == len(apart)
 
 
-def test_plots_stand_one_under_the_other_in_the_layout_of_narrow_screens() -> None:
+def test_on_narrow_screens_plots_stand_one_under_the_other_lines_are_divided_names_are_fewer_and_a_sphere_is_low() -> (
+    None
+):
     figure = plotly_figure(chart())
     wide, narrow = figure["layout"], figure["narrow"]
     assert wide["xaxis"]["domain"][1] < wide["xaxis2"]["domain"][0]
@@ -131,9 +129,6 @@ def test_plots_stand_one_under_the_other_in_the_layout_of_narrow_screens() -> No
     assert narrow["yaxis"]["domain"][0] > narrow["yaxis2"]["domain"][1]
     assert narrow["height"] > wide["height"] + chart().height
     assert "narrow" not in plotly_figure(replace(chart(), columns=1))
-
-
-def test_on_narrow_screens_long_lines_are_divided_names_are_fewer_and_a_sphere_is_as_high_as_its_outline() -> None:
     axes = PlotAxis("a" * 30 + " b / µg", names=tuple(f"p{k}" for k in range(40))), PlotAxis("y")
     plot = Plot("", *axes, (Trace("", np.arange(40.0), np.arange(40.0)),))
     figure = plotly_figure(Chart("", (plot,), note="word " * 20))

@@ -41,7 +41,7 @@ def resonant(f: Any, natural: float = 4000.0, quality: float = 30.0, pole: float
 F = np.geomspace(20.0, 9000.0, 45)
 
 
-def test_sensitivity_is_that_at_the_reference_frequency_and_the_resonance_is_stated() -> None:
+def test_sensitivity_is_that_at_the_reference_frequency_with_its_sign_and_the_resonance_is_stated() -> None:
     one, lines = swept_axis("SN7", points(F, resonant(F)), 2)
     at = F[np.argmin(np.abs(np.log(F / 160.0)))]
     assert one.reference_hz == pytest.approx(at)
@@ -52,9 +52,6 @@ def test_sensitivity_is_that_at_the_reference_frequency_and_the_resonance_is_sta
     assert one.transfer.quality == pytest.approx(30.0, rel=0.02)
     assert one.transfer.pole_hz == pytest.approx(12000.0, rel=0.06)
     assert lines[1].startswith("transfer function: low-pass")
-
-
-def test_a_falling_output_is_negative() -> None:
     one, _ = swept_axis("SN7", points(F, -resonant(F)), 2)
     assert one.sensitivity < 0.0
 

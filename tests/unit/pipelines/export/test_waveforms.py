@@ -1,14 +1,12 @@
 """Waveforms of dynamic tests go out to other programs' files and come back equal; files that lack what is needed are refused."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from in_process import document_of
 
 from pipelines.archive import Archive
-from pipelines.cli import app
 from pipelines.cli.export import WAVEFORMS as FORMATS
 from pipelines.export.waveforms import WRITERS, Channel, write_waveforms
 from pipelines.importers import files
@@ -114,10 +112,8 @@ def test_dwells_and_steps_of_others_are_imported_by_the_command(tmp_path: Path, 
         paths += write_waveforms("csv", made, tmp_path / f"dwell{k}.csv")
     part = tmp_path / "part.toml"
     part.write_text('nominal_scale = 0.3\neffects = ["second_order"]\nfull_scale = 5.0\n')
-    words = ["--procedure", "sweep", "--set", str(part), "--map", "z=dut [V],reference=ref [m/s^2]", "--units", "W1"]
-    words += ["--json", "--archive", str(tmp_path / "archive")]
-    answer = CliRunner().invoke(app, ["import", *map(str, paths), *words])
-    document = json.loads(answer.stdout)
+    words = ("--procedure", "sweep", "--set", part, "--map", "z=dut [V],reference=ref [m/s^2]", "--units", "W1")
+    document = document_of("import", *paths, *words, "--archive", tmp_path / "archive")
     figures = {one["figure"]: one["value"] for one in document["figures"]}
     assert figures["sweep_natural_hz"] == pytest.approx(2000.0, rel=0.01)
     assert figures["sweep_damping"] == pytest.approx(0.65, abs=0.01)

@@ -41,7 +41,7 @@ def bag(folder: Path) -> Path:
     return next((folder / "bag").glob("*.db3"))
 
 
-def test_a_topic_is_read_with_the_clock_of_its_headers(tmp_path: Path) -> None:
+def test_a_topic_is_read_with_the_clock_of_its_headers_also_with_a_journal_beside_the_bag(tmp_path: Path) -> None:
     path = bag(tmp_path)
     with pytest.raises(WrongUse, match=r"2 groups .*'/imu/data' \(200 samples\), '/told' \(1 samples\)"):
         files.read_content(path)
@@ -51,6 +51,9 @@ def test_a_topic_is_read_with_the_clock_of_its_headers(tmp_path: Path) -> None:
     np.testing.assert_allclose(content.table["linear_acceleration.x"], 0.01 * np.arange(200))
     assert content.units["linear_acceleration.x"] == "m/s^2"
     assert "time of the headers" in content.remarks[0]
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA journal_mode = WAL")
+    assert len(files.read_content(path, "/imu/data")[0].table) == 200
 
 
 CHANGES = {
@@ -72,10 +75,3 @@ def test_a_bag_that_cannot_be_read_is_refused_with_what_to_do(change: str, tmp_p
     assert CHANGES[change] in str(caught.value)
     assert "\n" not in str(caught.value)
     assert any(word in str(caught.value) for word in ("convert", "export"))
-
-
-def test_a_bag_that_was_recorded_with_a_journal_beside_it_is_read(tmp_path: Path) -> None:
-    path = bag(tmp_path)
-    with closing(sqlite3.connect(path)) as database:
-        database.execute("PRAGMA journal_mode = WAL")
-    assert len(files.read_content(path, "/imu/data")[0].table) == 200

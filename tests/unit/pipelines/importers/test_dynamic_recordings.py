@@ -72,12 +72,17 @@ def shock_file(path, rng, peak_g=480.0, duration_s=1e-3, *, reference=True):
     return path
 
 
+def shocked(path, *, part=None, **columns):
+    """The document of the import of a shock; ``columns`` : by the meaning, beside those of time and output."""
+    layout = RecordingLayout({"time": "t [s]", "z": "dut [g]"} | columns, {})
+    return import_waveforms([path], "shock", part, "S1", layout, str(path.parent / "archive"))
+
+
 @pytest.mark.parametrize("duration_ms", [0.5, 1.0, 11.0])
 def test_a_pulse_is_found_by_itself(duration_ms, tmp_path, rng):
     path = shock_file(tmp_path / "drop.csv", rng, duration_s=1e-3 * duration_ms)
     assert "--procedure shock" in inspect([path]).document["command"]
-    layout = RecordingLayout({"time": "t [s]", "reference": "ref [g]", "z": "dut [g]"}, {})
-    document = import_waveforms([path], "shock", None, "S1", layout, str(tmp_path / "archive"))
+    document = shocked(path, reference="ref [g]")
     figures = {one["figure"]: one["value"] for one in document["figures"]}
     assert figures["shock_peak_g"] == pytest.approx(480.0, rel=0.015)
     assert figures["shock_duration_ms"] == pytest.approx(duration_ms, rel=0.03)
@@ -85,28 +90,22 @@ def test_a_pulse_is_found_by_itself(duration_ms, tmp_path, rng):
     assert any(line.startswith("pulse: reference 4") for line in document["text"])
 
 
-def test_a_sensor_alone_has_its_pulse_and_no_sensitivity(tmp_path, rng):
+def test_a_sensor_alone_has_its_pulse_and_no_sensitivity_and_a_channel_that_no_test_reads_is_refused(tmp_path, rng):
     path = shock_file(tmp_path / "alone.csv", rng, reference=False)
-    layout = RecordingLayout({"time": "t [s]", "z": "dut [g]"}, {})
-    document = import_waveforms([path], "shock", None, "S1", layout, str(tmp_path / "archive"))
+    document = shocked(path)
     figures = {one["figure"]: one for one in document["figures"]}
     assert figures["shock_peak_g"]["value"] == pytest.approx(480.0, rel=0.015)
     assert "without a reference" in figures["shock_sensitivity_percent"]["note"]
-
-
-def test_a_channel_that_no_test_reads_is_refused_and_not_passed_over(tmp_path, rng):
     path = shock_file(tmp_path / "one.csv", rng, reference=False)
-    layout = RecordingLayout({"time": "t [s]", "z": "dut [g]", "reference_w": "dut [g]"}, {})
     with pytest.raises(WrongUse, match=r"--map reference_w=…: no channel of a recording; did you mean reference_"):
-        import_waveforms([path], "shock", None, "S1", layout, str(tmp_path / "archive"))
+        shocked(path, reference_w="dut [g]")
 
 
 def test_a_stated_duration_that_is_not_that_of_the_pulse_is_refused(tmp_path, rng):
     path, part = shock_file(tmp_path / "drop.csv", rng), tmp_path / "part.toml"
     part.write_text("duration_ms = 11.0\n")
-    layout = RecordingLayout({"time": "t [s]", "reference": "ref [g]", "z": "dut [g]"}, {})
     with pytest.raises(DataRejected, match=r"duration_ms is 11, the pulse lasts [01.9]+ ms"):
-        import_waveforms([path], "shock", part, "S1", layout, str(tmp_path / "archive"))
+        shocked(path, part=part, reference="ref [g]")
 
 
 def test_two_places_of_a_board_are_told_to_be_no_comparison(tmp_path, rng):
@@ -114,8 +113,7 @@ def test_two_places_of_a_board_are_told_to_be_no_comparison(tmp_path, rng):
     far = second_order(base, 700.0, 0.05, 50_000.0)  # a board that rings at 700 Hz between the two
     frame = {"t [s]": np.arange(base.size) / 50_000.0, "ref [g]": base, "dut [g]": far}
     pd.DataFrame(frame).to_csv(tmp_path / "board.csv", index=False)
-    layout = RecordingLayout({"time": "t [s]", "reference": "ref [g]", "z": "dut [g]"}, {})
-    document = import_waveforms([tmp_path / "board.csv"], "shock", None, "S1", layout, str(tmp_path / "archive"))
+    document = shocked(tmp_path / "board.csv", reference="ref [g]")
     sensitivity = next(one for one in document["figures"] if one["figure"] == "shock_sensitivity_percent")
     assert not sensitivity["identified"]
     assert "two places of a structure are no comparison" in sensitivity["note"]

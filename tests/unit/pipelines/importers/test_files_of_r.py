@@ -83,13 +83,12 @@ def test_every_kind_of_column_has_the_values_that_were_written(name: str) -> Non
     assert table["when"].isna().tolist() == [False, True, False]
 
 
-def test_a_file_that_another_program_wrote_is_the_same_table(tmp_path: Path) -> None:
+def test_a_file_that_another_program_wrote_is_the_same_table_and_one_without_a_data_frame_is_refused(
+    tmp_path: Path,
+) -> None:
     written = pd.DataFrame({"t": [0.0, 0.1], "ax": [1.5, np.nan], "still": [True, False]})
     rdata.write_rda(tmp_path / "a.rda", {"imu": written}, compression=None)
     table = reader.read("a.rda", (tmp_path / "a.rda").read_bytes(), "").table
     pd.testing.assert_frame_equal(table, written)
-
-
-def test_a_file_without_a_data_frame_is_refused() -> None:
     with pytest.raises(DataRejected, match="no data frame in this file of R, one is needed"):
         reader.read("a.rds", saved(vector(REAL, [1.0, 2.0])), "")

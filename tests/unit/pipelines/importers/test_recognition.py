@@ -108,20 +108,8 @@ def maker_of_sensors(rng: Rng, at: Path) -> Path:
     n = 4000
     still = G * accelerations(rng, np.tile([1.0, 0.03, -0.01], (n, 1)))
     angles = [["", "", ""] if k % 4 != 1 else [f"{v:.4f}" for v in (112.9, -88.2, 28.1)] for k in range(n)]
-    rows = [
-        "\t".join(
-            [
-                str(16213 + k),
-                str(10259826 + 25 * k),
-                *(f"{v:.6f}" for v in still[k]),
-                "0.001",
-                "-0.002",
-                "0.000",
-                *angles[k],
-            ]
-        )
-        for k in range(n)
-    ]
+    counted = [[str(16213 + k), str(10259826 + 25 * k), *(f"{v:.6f}" for v in still[k])] for k in range(n)]
+    rows = ["\t".join([*counted[k], "0.001", "-0.002", "0.000", *angles[k]]) for k in range(n)]
     head = ["// General information: ", "//  version: 2022.0.0 ", "// Coordinate system: ENU"]
     head.append("PacketCounter SampleTimeFine Acc_X Acc_Y Acc_Z Gyr_X Gyr_Y Gyr_Z Roll Pitch Yaw".replace(" ", "\t"))
     (at / "a.txt").write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
@@ -188,10 +176,8 @@ RIGHT = {
 
 def gyroscope_alone(rng: Rng, at: Path) -> Path:
     hand = Hand(rng)
-    savemat(
-        str(at / "a.mat"),
-        {"omega": np.column_stack([hand.time, np.rint(sensed(rng, hand.rate, 1880.0, (17.4,) * 3, 8.0))])},
-    )
+    counts = np.rint(sensed(rng, hand.rate, 1880.0, (17.4,) * 3, 8.0))
+    savemat(str(at / "a.mat"), {"omega": np.column_stack([hand.time, counts])})
     return at / "a.mat"
 
 
@@ -229,18 +215,9 @@ def two_sensors_mixed(rng: Rng, at: Path) -> Path:
 def weather(rng: Rng, at: Path) -> Path:
     n = 3000
     day = np.sin(np.arange(n) / 400.0)
-    columns = {
-        "row": np.arange(n),
-        "t": np.arange(n),
-        "T1": 20.0 + 5.0 * day,
-        "T2": 20.3 + 4.6 * day,
-        "T3": 19.0 + 5.5 * day,
-    }
-    columns = {
-        name: np.asarray(one, dtype=float) + 0.01 * rng.normal(size=n) * (name[0] == "T")
-        for name, one in columns.items()
-    }
-    return csv(at / "a.csv", columns)
+    places = {"T1": (20.0, 5.0), "T2": (20.3, 4.6), "T3": (19.0, 5.5)}
+    air = {name: mean + swing * day + 0.01 * rng.normal(size=n) for name, (mean, swing) in places.items()}
+    return csv(at / "a.csv", {"row": np.arange(n), "t": np.arange(n)} | air)
 
 
 def reference_alone(rng: Rng, at: Path) -> Path:
@@ -347,10 +324,8 @@ def test_a_record_that_never_rests_has_no_stops_and_a_noisy_one_at_rest_has(rng:
     force = np.column_stack(
         [np.sin(tilt[:, 0]), np.cos(tilt[:, 0]) * np.sin(tilt[:, 1]), np.cos(tilt[:, 0]) * np.cos(tilt[:, 1])]
     )
-    for name, output, stops in (
-        ("moving", force, 0),
-        ("noisy", [0.0, 0.0, 1.0] + 0.3 * rng.normal(size=force.shape), 1),
-    ):
+    noisy = [0.0, 0.0, 1.0] + 0.3 * rng.normal(size=force.shape)
+    for name, output, stops in (("moving", force, 0), ("noisy", noisy, 1)):
         columns = {"time [s]": time}
         named(columns, "ax[g] ay[g] az[g]", output + 0.002 * rng.normal(size=force.shape))
         seen = recognise([csv(tmp_path / f"{name}.csv", columns)])
@@ -378,11 +353,8 @@ def test_files_that_follow_one_another_are_positions_of_their_own(rng: Rng, tmp_
 
 
 def test_two_levels_of_something_are_no_clock(rng: Rng, tmp_path: Path) -> None:
-    columns = {
-        "length": rng.uniform(30.0, 60.0, 8),
-        "frequency": rng.uniform(4.0, 100.0, 8),
-        "mode": np.repeat([1.0, 2.0], 4),
-    }
+    columns = {"length": rng.uniform(30.0, 60.0, 8), "frequency": rng.uniform(4.0, 100.0, 8)}
+    columns["mode"] = np.repeat([1.0, 2.0], 4)
     assert recognise([csv(tmp_path / "a.csv", columns)]).guessed.column("time") == ""
 
 
@@ -396,18 +368,9 @@ IN_EXCHANGE_FORMAT = {
 def dwells_of_units(rng: Rng, scale: float = 1.0) -> pd.DataFrame:
     """Dwells of three units in the exchange format, one unit after the other, but for the names of the outputs."""
     rows, time = 3 * 24, np.tile(90.0 * np.arange(24), 3) + 1800.0
-    columns = {
-        "unit": np.repeat(["S1", "S2", "S3"], 24),
-        "slot": np.repeat(range(3), 24),
-        "dwell": np.tile(range(3, 27), 3),
-    }
-    columns |= {
-        "time_s": time,
-        "duration_s": 40.0,
-        "n": 400,
-        "since_power_s": time,
-        "since_move_s": rng.uniform(30.0, 60.0, rows),
-    }
+    columns = {"unit": np.repeat(["S1", "S2", "S3"], 24), "slot": np.repeat(range(3), 24)}
+    columns |= {"dwell": np.tile(range(3, 27), 3), "time_s": time, "duration_s": 40.0, "n": 400}
+    columns |= {"since_power_s": time, "since_move_s": rng.uniform(30.0, 60.0, rows)}
     columns |= {"outer_deg": rng.uniform(0.0, 180.0, rows), "inner_deg": rng.uniform(-180.0, 180.0, rows)}
     named(columns, "ax ay az", accelerations(rng, np.tile(Hand(rng, stops=24).stops, (3, 1)), scale))
     named(columns, "sd_x sd_y sd_z", rng.uniform(0.001, 0.002, (rows, 3)) * scale)
@@ -438,12 +401,8 @@ def test_columns_named_as_in_the_exchange_format_serials_and_numbers_of_dwells_a
 
 def test_names_of_the_exchange_format_in_a_record_of_samples_are_no_dwells(rng: Rng, tmp_path: Path) -> None:
     hand = Hand(rng)
-    columns = {
-        "n": np.arange(hand.n),
-        "unit": np.repeat("mg", hand.n),
-        "time_s": hand.time,
-        "supply_V": np.full(hand.n, 3.3),
-    }
+    columns = {"n": np.arange(hand.n), "unit": np.repeat("mg", hand.n), "time_s": hand.time}
+    columns["supply_V"] = np.full(hand.n, 3.3)
     named(columns, "ax ay az", np.round(accelerations(rng, hand.force, 1000.0), 2))
     seen = recognise([csv(tmp_path / "a.csv", columns)])
     assert seen.keys is not None

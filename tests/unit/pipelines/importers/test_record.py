@@ -141,7 +141,7 @@ def test_day_and_month_that_cannot_be_told_apart_matter_only_where_the_date_chan
         seconds(stamps)
 
 
-def test_standard_deviations_in_another_unit_than_their_outputs_are_refused(rng: np.random.Generator) -> None:
+def test_standard_deviations_of_no_output_or_in_another_unit_than_theirs_are_refused(rng: np.random.Generator) -> None:
     names = ["x", "y", "z", "sd_x", "sd_y", "sd_z"]
     frame = pd.DataFrame(rng.normal(size=(12, 6)), columns=names)
     mapping = build({"columns": {name: name for name in names}, "units": {"output": "V"}}, "t")
@@ -151,9 +151,6 @@ def test_standard_deviations_in_another_unit_than_their_outputs_are_refused(rng:
         with pytest.raises(WrongUse, match=f"column 'sd_y' .* states {stated}, V is the unit of the output"):
             refuse_contradiction(mapping, content, "f.csv")
     refuse_contradiction(mapping, Content(frame, units=outputs | {"sd_x": "V", "sd_y": "n=400"}), "f.csv")
-
-
-def test_a_standard_deviation_of_an_output_that_is_not_mapped_is_refused() -> None:
     with pytest.raises(RecipeInvalid, match="sd_y without y"):
         build({"columns": {"x": "a", "sd_y": "b"}, "units": {"output": "V"}, "axes": ["x"]}, "t")
 
@@ -180,16 +177,15 @@ def of_size(rng: np.random.Generator, size: float) -> pd.DataFrame:
 IN_COUNTS = {"columns": {"x": "ax", "y": "ay", "z": "az"}, "units": {"output": "LSB"}, "unit": "A1"}
 
 
-def test_means_of_counts_need_not_be_whole_numbers_and_their_unit_is_asked_about(rng: np.random.Generator) -> None:
+def test_means_of_counts_need_not_be_whole_numbers_but_where_there_are_fewer_a_g_than_converters_have(
+    rng: np.random.Generator,
+) -> None:
     found = imported(of_size(rng, 1033.0), build({**IN_COUNTS, "rows": "dwells"}, "t"), "f.csv")
     assert found.out_unit == "LSB"
     assert [one for one in found.remarks if "the norm of the output is 1033, as gravity in mg; LSB was given" in one]
-
-
-@pytest.mark.parametrize(("size", "rows"), [(1.01, "dwells"), (9.8, "dwells"), (1033.0, "samples")])
-def test_fewer_counts_per_g_than_converters_have_and_parts_of_a_count_are_refused(size, rows, rng) -> None:
-    with pytest.raises(DataRejected, match="are not whole numbers, counts are needed"):
-        imported(of_size(rng, size), build({**IN_COUNTS, "rows": rows, "rate_hz": 1.0}, "t"), "f.csv")
+    for size, rows in ((1.01, "dwells"), (9.8, "dwells"), (1033.0, "samples")):
+        with pytest.raises(DataRejected, match="are not whole numbers, counts are needed"):
+            imported(of_size(rng, size), build({**IN_COUNTS, "rows": rows, "rate_hz": 1.0}, "t"), "f.csv")
 
 
 AS_LABELS = "labels only"

@@ -1,16 +1,14 @@
 """A transfer function that was measured elsewhere is judged, kept and refused with the reason."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from each import each
+from in_process import document_of
 from scipy import signal
-from typer.testing import CliRunner
 
 from pipelines.archive import Archive
-from pipelines.cli import app
 from pipelines.importers.transfer import import_transfer
 from schemas.errors import DataRejected
 
@@ -49,10 +47,8 @@ def test_the_missing_pole_is_named_the_error_falls_and_the_command_says_so_by_it
     assert "one_pole" in diagnosis["classes"][0]["effects"]
     assert diagnosis["extended_percent"] < 0.2 * diagnosis["error_percent"]
     assert diagnosis["left_out"][1] == pytest.approx(1.0, abs=0.25)
-    words = ["import", str(path), "--procedure", "sweep", "--units", "S1", "--archive", archive, "--json"]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 1
-    assert json.loads(result.stdout)["recommended"]
+    words = ("import", path, "--procedure", "sweep", "--units", "S1", "--archive", archive)
+    assert document_of(*words, status=1)["recommended"]
 
 
 @each([

@@ -1,6 +1,5 @@
 """The verdict on the model of a run: the line after it, the panel of its report and ``diagnose`` say the same."""
 
-import json
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,13 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from capture_double import small_run
+from in_process import document_of
 from long_suites import mostly_slow
 from lots import lot
-from typer.testing import CliRunner
 
 from inertial.uncertainty.rounding import chance
 from pipelines.archive import Archive, Run
-from pipelines.cli import app
 from pipelines.cli.text.verdict_text import print_adequacy
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.sentences import verdict
@@ -95,13 +93,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return small_run(tmp_path_factory.mktemp("judged"))
 
 
-def _command(*words: object) -> str:
-    return CliRunner().invoke(app, [str(word) for word in words]).stdout
-
-
 def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     place = ("--archive", run.archive.root)
-    whole = json.loads(_command("diagnose", run.id, "--json", *place))
+    whole = document_of("diagnose", run.id, *place)
     document = adequacy_of(run)
     assert document["adequate"] is whole["adequate"]
     assert {name: document[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}
@@ -125,7 +119,7 @@ def test_the_verdict_of_a_run_is_read_from_its_archive(run: Run, monkeypatch: py
     [row] = run.table("verdict").to_dict("records")
     assert row["model"] == ",".join(run.about["recipe"]["effects"])
     assert row["p_value"] == document["p_value"]
-    runs = json.loads(_command("list", "--json", "--archive", run.archive.root))["runs"]
+    runs = document_of("list", "--archive", run.archive.root)["runs"]
     listed = next(one for one in runs if one["id"] == run.id)  # another test runs it again with another model
     assert listed["verdict"] == row["verdict"] == ("adequate" if document["adequate"] else "not adequate")
 
@@ -137,7 +131,7 @@ def test_another_model_of_a_run_has_a_verdict_of_its_own(run: Run) -> None:
     ).new
     document = adequacy_of(archive.run(other))
     assert document is not None
-    whole = json.loads(_command("diagnose", other, "--json", "--archive", run.archive.root))
+    whole = document_of("diagnose", other, "--archive", run.archive.root)
     assert (document["adequate"], document["p_value"]) == (whole["adequate"], whole["error"]["p_value"])
 
 

@@ -42,7 +42,7 @@ def test_a_place_of_the_map_and_its_direction_belong_together() -> None:
     assert direction_at(1.9, 0.9) is None
 
 
-def test_a_moved_pose_is_the_only_difference_and_a_verification_pose_moves_in_all_its_repetitions() -> None:
+def test_a_moved_pose_is_the_only_difference_in_all_its_repetitions_and_moves_that_cannot_be_are_refused() -> None:
     recipe = load_recipe("production")
     moved = with_moved_poses(recipe, moves_of(["p05=45,-90", "v1=20,0.5", "p05=46,-90"], "plan"), "plan")
     changed = [(a, b) for a, b in zip(recipe.poses, moved.poses, strict=True) if a != b]
@@ -50,13 +50,9 @@ def test_a_moved_pose_is_the_only_difference_and_a_verification_pose_moves_in_al
     assert [p.inner_deg for p in moved.verification if p.name == "v1"] == [0.5] * 3
     kept = {"poses", "verification"}
     assert moved.model_dump(exclude=kept) == recipe.model_dump(exclude=kept)
-
-
-def test_moves_that_a_recipe_cannot_have_are_refused() -> None:
     for text in ("p05", "p05=45", "p05=45,x", "p05=45,90,1", "p05=400,0", "p05=nan,0"):
         with pytest.raises(WrongUse, match="pose"):
             moves_of([text], "plan")
-    recipe = load_recipe("production")
     with pytest.raises(WrongUse, match="no pose 'p99'"):
         with_moved_poses(recipe, {"p99": (0.0, 0.0)}, "plan")
     fit = recipe.poses[3]

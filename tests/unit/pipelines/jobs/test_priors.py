@@ -31,7 +31,9 @@ def archive(tmp_path: Path) -> Archive:
     return family_archive(tmp_path / "archive", recipe_file(tmp_path, *BRIEF), SPREAD)
 
 
-def test_the_family_is_that_of_the_archive_and_a_run_keeps_it(recipe: Recipe, archive: Archive) -> None:
+def test_the_family_is_that_of_the_archive_without_the_units_of_the_lot_and_a_plan_has_its_precision_in_g(
+    recipe: Recipe, archive: Archive
+) -> None:
     stored = stored_family(recipe, archive, set(), "simulated")
     assert stored is not None
     assert (stored.units, stored.lots, len(stored.runs)) == (LOTS * UNITS, LOTS, LOTS)
@@ -40,12 +42,13 @@ def test_the_family_is_that_of_the_archive_and_a_run_keeps_it(recipe: Recipe, ar
     spread = np.sqrt(np.diagonal(own.unit + own.lot, axis1=-2, axis2=-1))
     assert spread == pytest.approx(LSB * SPREAD, rel=0.5)
     np.testing.assert_allclose(own.mean, stored.mean)
-
-
-def test_units_of_the_lot_are_left_out(recipe: Recipe, archive: Archive) -> None:
     stored = stored_family(recipe, archive, {"E00-0", "E05-3"}, "simulated")
     assert stored is not None
     assert stored.units == LOTS * UNITS - 2
+    precision = planned_precision(recipe, str(archive.root), "simulated")
+    assert precision is not None
+    # the predicted spread is wider than that of the calibrations
+    assert np.sqrt(np.diagonal(np.linalg.inv(precision), axis1=-2, axis2=-1)) == pytest.approx(SPREAD, rel=0.6)
 
 
 def test_units_that_were_calibrated_before_have_a_prior_of_their_own(
@@ -92,11 +95,6 @@ def test_a_unit_leans_on_its_wafer(recipe: Recipe, tmp_path: Path) -> None:
         stored_family(recipe.model_copy(update={"prior": PriorTerms(attribute="wafre")}), archive, set(), "simulated")
 
 
-def test_a_recipe_without_a_prior_reads_nothing(recipe: Recipe, tmp_path: Path) -> None:
-    plain = recipe.model_copy(update={"prior": None})
-    assert stored_family(plain, Archive(tmp_path / "none"), set(), "simulated") is None
-
-
 def test_calibrations_that_say_nothing_of_the_family_do_not_count(
     recipe: Recipe, archive: Archive, tmp_path: Path
 ) -> None:
@@ -108,29 +106,21 @@ def test_calibrations_that_say_nothing_of_the_family_do_not_count(
     assert stored.units == LOTS * UNITS
 
 
-@pytest.mark.parametrize(
-    ("changes", "kind", "what"),
-    [
+def test_an_archive_without_a_family_is_refused_and_a_recipe_without_a_prior_reads_none(
+    recipe: Recipe, archive: Archive, tmp_path: Path
+) -> None:
+    for changes, kind, what in (
         ({"device": "qa700"}, "simulated", "no calibration of qa700 with this model"),
         ({}, "modbus", "no calibration of adxl355 with this model"),
         ({"prior": PriorTerms(since=date(2999, 1, 1))}, "simulated", "no calibration"),
-    ],
-)
-def test_an_archive_without_a_family_is_refused(
-    recipe: Recipe, archive: Archive, changes: dict[str, object], kind: str, what: str
-) -> None:
-    with pytest.raises(RecipeInvalid, match=what):
-        stored_family(recipe.model_copy(update=changes), archive, set(), kind)
+    ):
+        with pytest.raises(RecipeInvalid, match=what):
+            stored_family(recipe.model_copy(update=changes), archive, set(), kind)
+    plain = recipe.model_copy(update={"prior": None})
+    assert stored_family(plain, Archive(tmp_path / "none"), set(), "simulated") is None
 
 
 def test_too_few_lots_are_refused(recipe: Recipe, tmp_path: Path) -> None:
     small = family_archive(tmp_path / "small", recipe_file(tmp_path, *BRIEF), SPREAD, lots=4)
     with pytest.raises(RecipeInvalid, match=r"16 calibrations in 4 lots, 4 coefficients need 8 lots"):
         stored_family(recipe, small, set(), "simulated")
-
-
-def test_a_plan_has_the_precision_in_g(recipe: Recipe, archive: Archive) -> None:
-    precision = planned_precision(recipe, str(archive.root), "simulated")
-    assert precision is not None
-    # the predicted spread is wider than that of the calibrations
-    assert np.sqrt(np.diagonal(np.linalg.inv(precision), axis1=-2, axis2=-1)) == pytest.approx(SPREAD, rel=0.6)

@@ -9,17 +9,16 @@ from pathlib import Path
 
 import pytest
 from capture_double import CaptureDouble, recipe_file
+from in_process import document_of, given, text_of
 from rdflib import Graph as Rdf
 from rdflib import Namespace
 from root_process import ROOT
-from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE
 from pipelines.certificates import Ledger
 from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
-from pipelines.cli import app
 from pipelines.jobs.job import Request
 from pipelines.lineage import Lineage, lineage
 from pipelines.lineage.prov import iri, prov_of
@@ -107,17 +106,15 @@ def test_a_file_that_was_copied_out_is_known_by_its_content(run: Run, tmp_path: 
         lineage(run.archive, "small-x")
 
 
-def test_a_run_is_followed_back_to_what_it_runs_again_and_forth(run: Run, tmp_path: Path) -> None:
+def test_a_run_is_followed_to_what_it_runs_again_and_a_unit_without_certificate_from_its_grades(
+    run: Run, tmp_path: Path
+) -> None:
     shutil.copytree(run.archive.root, tmp_path / "archive")
     archive = Archive(tmp_path / "archive")
     again = archive.open_run("small", {**run.about, "rerun_of": run.id, "because": []}, {"again": 1})
     more = archive.open_run("small-next", {**run.about, "parents": [again.id], "rerun_of": None}, {"more": 1})
     assert {again.id, run.id} <= labels(lineage(archive, more.id), "run")
     assert again.id in labels(lineage(archive, run.id), "run")
-
-
-def test_a_unit_without_certificate_is_followed_from_its_grades(run: Run, tmp_path: Path) -> None:
-    shutil.copytree(run.archive.root, tmp_path / "archive")
     shutil.rmtree(tmp_path / "archive" / "calibrations")
     traced = lineage(Archive(tmp_path / "archive"), "A3")
     assert (traced.kind, traced.focus) == ("unit", (f"runs/{run.id}/grades.parquet",))
@@ -186,15 +183,12 @@ def test_the_crate_holds_every_file_and_its_hash(of_unit: Lineage, run: Run, tmp
 
 
 def test_the_command_shows_the_way_once_and_writes_prov_crate_and_json(run: Run, tmp_path: Path) -> None:
-    def ask(*arguments: str) -> str:
-        words = ["lineage", "A1", *arguments, "--archive", str(run.archive.root)]
-        return CliRunner().invoke(app, words, env={"COLUMNS": "200"}, catch_exceptions=False).stdout
-
-    shown = ask()
-    known = ("certificate A1/1", "by fit", "raw samples  23 records", "reference AG-7", "station simulated", "pyarrow")
+    words = ("lineage", "A1", "--archive", run.archive.root)
+    shown = text_of(*words)
+    known = ("certificate A1/1", "by fit", "raw samples 23 records", "reference AG-7", "station simulated", "pyarrow")
     assert [words for words in known if words not in shown] == []
     assert shown.count("by fit") == 1
-    document = json.loads(ask("--json", "--output", str(tmp_path / "p.jsonld"), "--output", str(tmp_path / "c")))
+    document = document_of(*words, "--output", tmp_path / "p.jsonld", "--output", tmp_path / "c")
     assert document["focus"] == [node["id"] for node in document["things"] if node["kind"] == "certificate"]
-    assert json.loads((tmp_path / "p.jsonld").read_text()) == json.loads(ask("--output", "-"))
+    assert json.loads((tmp_path / "p.jsonld").read_text()) == json.loads(given(*words, "--output", "-")[1])
     assert (tmp_path / "c" / "ro-crate-metadata.json").is_file()

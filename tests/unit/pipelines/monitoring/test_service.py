@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 import threading
 from collections import Counter
 from collections.abc import Iterator
@@ -18,6 +16,7 @@ import yaml
 from asgi_client import AsgiClient
 from capture_double import small_run
 from each import each
+from in_process import given
 from prometheus_client.parser import text_string_to_metric_families
 from root_process import ROOT
 
@@ -299,7 +298,7 @@ def test_alerts_are_posted_as_they_come_and_go_on_after_a_refusal_and_an_unexpec
     assert [one["kind"] for one in accepted] == ["unsafe"]
 
 
-def test_messages_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_and_the_error_of_a_command_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("TUMBLELINE_LOG", raising=False)
     assert log_line("line-1: it is", queue="line-1") == "tumbleline: line-1: it is\n"
     monkeypatch.setenv("TUMBLELINE_LOG", "json")
@@ -308,13 +307,9 @@ def test_messages_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
     content = json.loads(line)
     assert (content["message"], content["level"], content["queue"]) == ("a\n“b”", "error", "line-1")
     assert datetime.fromisoformat(content["when"]).tzinfo is not None
-
-
-def test_a_command_tells_its_error_as_json_on_request() -> None:
-    command = [sys.executable, "-m", "pipelines.cli", "--log", "json", "shw"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    content = json.loads(done.stderr)
+    status, _, err = given("--log", "json", "shw")
+    assert status == 2
+    content = json.loads(err)
     assert (content["level"], content["status"]) == ("error", 2)
     assert "no command is called 'shw'" in content["message"]
 

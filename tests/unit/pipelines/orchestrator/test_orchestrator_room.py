@@ -54,16 +54,7 @@ def test_credentials_are_taken_out_and_refused(address: str, left: str) -> None:
     assert "secret" not in str(told.value).replace("Secret block", "")
 
 
-def test_the_worker_takes_the_credentials_from_its_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = "s3://AKIA:secret@factory/archive?region=us-east-1&scheme=http&endpoint_override=127.0.0.1:9"
-    monkeypatch.setenv("TUMBLELINE_ARCHIVE", whole)
-    assert archive_of(None).address == whole
-    assert archive_of(without_credentials(whole)).address == whole
-    other = "s3://factory/other?region=us-east-1"
-    assert archive_of(other).address == other
-
-
-def test_a_command_names_its_archive_without_credentials_and_its_flow_finds_them(
+def test_a_command_names_its_archive_without_credentials_and_flow_and_worker_find_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("TUMBLELINE_ARCHIVE", "elsewhere")
@@ -72,6 +63,12 @@ def test_a_command_names_its_archive_without_credentials_and_its_flow_finds_them
         assert shown == "s3://factory/archive?region=us-east-1"
         assert archive_of(shown).address == whole
     assert archive_of(None).address.endswith("elsewhere")
+    whole = "s3://AKIA:secret@factory/archive?region=us-east-1&scheme=http&endpoint_override=127.0.0.1:9"
+    monkeypatch.setenv("TUMBLELINE_ARCHIVE", whole)
+    assert archive_of(None).address == whole
+    assert archive_of(without_credentials(whole)).address == whole
+    other = "s3://factory/other?region=us-east-1"
+    assert archive_of(other).address == other
 
 
 DEPLOY = ROOT / "deploy"

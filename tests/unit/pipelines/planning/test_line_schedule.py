@@ -186,15 +186,14 @@ def test_shifts_that_overlap_count_once(shifts: list[str], part: float) -> None:
     assert row["bound_per_lot_min"] == pytest.approx(row["minutes_per_lot"] / part)
 
 
-def test_a_line_without_a_schedule_is_refused() -> None:
+def test_a_line_without_a_schedule_is_refused_and_a_search_that_ends_does_not_say_that_there_is_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     lots = [[phase("measure", 6), phase("exciter", 5000), phase("measure", 6)]]
     shared = [{"name": name, "needed_for": [name], "change_min": 2, "by_hand": True} for name in ("measure", "exciter")]
     line = line_of(2, 1, longest_wait_min=1, operators={"shifts": ["06:00-06:10"]}, start="06:00", shared=shared)
     with pytest.raises(RecipeInvalid, match=r"longest_wait_min 1 .* lengthen a shift"):
         shortest(line, lots)
-
-
-def test_a_search_that_ends_without_a_schedule_does_not_say_that_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(line_schedule, "WORK", 0.0)
     lots = [[phase("soak", 6), phase("measure", 6)]] * 4
     table = [{"name": "table", "needed_for": ["measure"], "change_min": 0.5, "by_hand": True}]

@@ -55,29 +55,23 @@ def test_the_same_dwells_are_known_no_later(context: PlanContext, factor: float)
     assert found.until == known_after(again, required)
 
 
-def test_little_that_is_asked_needs_both_ends_alone(context: PlanContext) -> None:
+def test_little_that_is_asked_needs_both_ends_alone_and_what_the_whole_plan_reaches_its_end(
+    context: PlanContext,
+) -> None:
     """By hand: nothing is asked but a model that is determined; the way over both ends is shortest from one to the other."""
     found = ordered(context, np.full_like(identified(context).errors, np.inf))
     assert set(found.recipe.temperatures_C[:2]) == {-10.0, 60.0}
     assert found.until is not None
     assert found.until < 0.6 * context.minutes
-
-
-def test_what_the_whole_plan_reaches_is_known_at_its_end(context: PlanContext) -> None:
-    """At its end there is no allowance for several looks; a plan with larger errors never reaches what is asked for."""
     errors = identified(context).errors
     assert known_after(context, 1.001 * errors) == context.minutes
     assert known_after(context, 0.999 * errors) is None
 
 
-def test_no_look_comes_before_both_ends_of_the_range(context: PlanContext) -> None:
+def test_no_look_comes_before_both_ends_of_the_range_or_rests_on_a_single_dwell(context: PlanContext) -> None:
     counts = look_counts(context.activities, context.station, context.recipe)
     assert 24 < counts[0] <= 30  # the third soak of twelve has begun
     assert counts[-1] < 60
-
-
-def test_no_look_rests_on_a_single_dwell(context: PlanContext) -> None:
-    """By hand: the hat matrix of the dwells so far, of which no diagonal element may exceed one half."""
     columns = design.local_columns(
         design.split(context.recipe.effects)[0], context.state, design.starting_values([], context.state)
     )
@@ -88,15 +82,12 @@ def test_no_look_rests_on_a_single_dwell(context: PlanContext) -> None:
     assert max(np.max(np.diagonal(one)) for one in before) > 0.5
 
 
-def test_poses_with_waits_keep_their_order() -> None:
+def test_poses_with_waits_keep_their_order_and_ramps_are_refused() -> None:
     waits = [float(k) for k in range(12)]
     soaks = [SoakPart(temperature_C=t, poses=list(range(1, 13)), waits_s=waits) for t in (-10.0, 60.0)]
     context = planned([-10.0, 60.0], soaks=soaks)
     found = ordered(context, np.full_like(identified(context).errors, np.inf))
     assert all(part.poses == list(range(1, 13)) for part in found.recipe.soaks)
-
-
-def test_ramps_are_refused() -> None:
     soaks = [SoakPart(temperature_C=t, poses=list(range(1, 13)), settled=False) for t in (60.0, -10.0)]
     context = planned([60.0, -10.0], soaks=soaks)
     with pytest.raises(RecipeInvalid, match="measures on ramps"):

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from long_suites import mostly_slow
 from numpy.typing import NDArray
+from procedure_records import procedure_records
 from scipy import optimize, signal
 from small_station import captured, lot_of, short_recipe, station_of
 
@@ -14,8 +15,7 @@ from inertial.frames import force_from_angles
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable, roles_of
 from pipelines.procedures.exposure import PLAIN
 from pipelines.procedures.figures import FigureValue, Outcome
-from pipelines.procedures.recorded import Device, nominal_device, procedure_record
-from pipelines.schedule.steps import steps
+from pipelines.procedures.recorded import Device
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
 from schemas.simulation import Hidden
@@ -42,13 +42,7 @@ def recipe_of(**keys: Any) -> Recipe:
 def measured(config: StationConfig, recipe: Recipe | None = None) -> tuple[pd.DataFrame, Device]:
     recipe, lot = recipe or recipe_of(), lot_of(2)
     sink = captured(recipe, lot, config, roles=roles_of(recipe))
-    readings = sink.all(1)
-    records = [
-        procedure_record(k, step.order, [sink.records[k][0]], readings[readings["record"] == k])
-        for k, step in enumerate(steps(recipe))
-        if step.order is not None
-    ]
-    device = nominal_device(readings)
+    records, device = procedure_records(recipe, sink)
     return EXPOSURE.reduce(parts_of(recipe)[0], records, device), device
 
 
@@ -86,7 +80,7 @@ def test_a_device_that_keeps_nothing_has_no_shift_beyond_u() -> None:
     }
 
 
-def test_temperatures_out_of_order_or_beyond_the_station_are_refused() -> None:
+def test_temperatures_out_of_order_or_beyond_the_station_and_levels_of_no_profile_are_refused() -> None:
     with pytest.raises(RecipeInvalid, match="exchange them"):
         parts_of(recipe_of(low_C=60.0, high_C=-10.0))
     with pytest.raises(RecipeInvalid, match="high_C 125 °C, -40 to 85 °C is allowed"):
@@ -97,6 +91,20 @@ def test_temperatures_out_of_order_or_beyond_the_station_are_refused() -> None:
     narrow = station.model_copy(update={"limits": station.limits.model_copy(update={"inner_deg": (-45.0, 200.0)})})
     with pytest.raises(RecipeInvalid, match="face -x: inner axis -90 deg, -45 to 200 deg is allowed"):
         refuse_unusable(recipe_of(), narrow)
+
+    def parts(**keys: Any) -> Any:
+        return parts_of(recipe_of().model_copy(update={"procedures": [{"kind": "exposure", "scale": 1.0, **keys}]}))
+
+    with pytest.raises(RecipeInvalid, match="no exposure profile 'iec_60068_2_30'"):
+        parts(profile="iec_60068_2_30")
+    with pytest.raises(RecipeInvalid, match="low_C: missing, profile iec_60068_2_14_na has none of its own"):
+        parts(profile="iec_60068_2_14_na")
+    with pytest.raises(RecipeInvalid, match="pressure_hPa: profile iec_60068_2_30_db has no such level"):
+        parts(profile="iec_60068_2_30_db", pressure_hPa=300.0)
+    (rates,) = parts(profile="iec_60068_2_14_nb", low_C=-40.0, high_C=85.0)
+    assert [leg.change_s / 60.0 for _, _, leg in rates.legs()] == [65.0, 125.0, 125.0, 125.0]
+    bare = load_station().model_copy(update={"equipment": Equipment(built_in=False)})
+    refuse_unusable(recipe_of(), bare)  # the chamber alone carries it out
 
 
 def test_no_face_is_measured_twice_without_a_move() -> None:
@@ -252,19 +260,3 @@ def test_damp_heat_swells_the_moulding_and_it_has_not_dried_after_the_recovery()
         saturated = change.value / (1e6 * 0.02 * row["xyz".index(change.axis)])
         assert 0.93 - 0.45 < saturated < 0.93 - driest
         assert 0.3 < shift.value / change.value < 1.0
-
-
-def test_levels_that_a_profile_does_not_have_or_lacks_are_refused() -> None:
-    def parts(**keys: Any) -> Any:
-        return parts_of(recipe_of().model_copy(update={"procedures": [{"kind": "exposure", "scale": 1.0, **keys}]}))
-
-    with pytest.raises(RecipeInvalid, match="no exposure profile 'iec_60068_2_30'"):
-        parts(profile="iec_60068_2_30")
-    with pytest.raises(RecipeInvalid, match="low_C: missing, profile iec_60068_2_14_na has none of its own"):
-        parts(profile="iec_60068_2_14_na")
-    with pytest.raises(RecipeInvalid, match="pressure_hPa: profile iec_60068_2_30_db has no such level"):
-        parts(profile="iec_60068_2_30_db", pressure_hPa=300.0)
-    (rates,) = parts(profile="iec_60068_2_14_nb", low_C=-40.0, high_C=85.0)
-    assert [leg.change_s / 60.0 for _, _, leg in rates.legs()] == [65.0, 125.0, 125.0, 125.0]
-    bare = load_station().model_copy(update={"equipment": Equipment(built_in=False)})
-    refuse_unusable(recipe_of(), bare)  # the chamber alone carries it out

@@ -6,14 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from each import each
+from procedure_records import procedure_records
 from small_station import MemorySink, captured, lot_of, quiet_progress, short_recipe, station_of
 
 from benchmarks.rotation import judge
 from pipelines.capture.capture import capture
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable
 from pipelines.procedures.figures import Outcome
-from pipelines.procedures.recorded import Device, nominal_device, procedure_record
-from pipelines.schedule.steps import steps
+from pipelines.procedures.recorded import nominal_device
 from schemas.errors import RecipeInvalid
 from schemas.event import MemoryLog
 from schemas.recipe import Recipe
@@ -36,14 +36,7 @@ def recipe_of(**keys: Any) -> Recipe:
 
 
 def evaluated(recipe: Recipe, sink: MemorySink) -> tuple[pd.DataFrame, Outcome]:
-    readings = sink.all(1)
-    records: list[Any] = [
-        procedure_record(k, step.order, [sink.records[k][0]], readings[readings["record"] == k])
-        for k, step in enumerate(steps(recipe))
-        if step.order is not None
-    ]
-    device: Device = nominal_device(readings)
-    part = parts_of(recipe)[0]
+    (records, device), part = procedure_records(recipe, sink), parts_of(recipe)[0]
     points = ROTATION.reduce(part, records, device)
     return points, ROTATION.evaluate(part, points, device)
 

@@ -5,12 +5,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from procedure_records import procedure_records
 from small_station import captured, lot_of, plant_of, short_recipe, station_of
 
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable, roles_of
 from pipelines.procedures.figures import FigureValue, Outcome
-from pipelines.procedures.recorded import nominal_device, procedure_record
-from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
 from schemas.station import load_station
@@ -29,13 +28,7 @@ def recipe_of(device: str, scale: float, **keys: Any) -> Recipe:
 def outcome(device: str, scale: float, **keys: Any) -> tuple[Outcome, pd.DataFrame]:
     recipe, lot = recipe_of(device, scale, **keys), lot_of(2, device)
     sink = captured(recipe, lot, station_of(), roles=roles_of(recipe))
-    readings = sink.all(1)
-    records = [
-        procedure_record(k, step.order, [sink.records[k][0]], readings[readings["record"] == k])
-        for k, step in enumerate(steps(recipe))
-        if step.order is not None
-    ]
-    (part,), made = parts_of(recipe), nominal_device(readings)
+    (part,), (records, made) = parts_of(recipe), procedure_records(recipe, sink)
     points = RIPPLE.reduce(part, records, made)
     assert not points.duplicated(["unit", "axis", "series", "point"]).any()
     assert len(RIPPLE.chart(part, points).plots[0].traces) == 2

@@ -5,15 +5,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from procedure_records import procedure_records
 from small_station import captured, lot_of, short_recipe, station_of
 
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS
 from inertial.dynamics.transfer_effects.gas_damping import viscosity
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable, roles_of
-from pipelines.procedures.recorded import nominal_device, procedure_record
 from pipelines.procedures.sweep_points import transfer_points
-from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid
 from schemas.station import load_station
 from stations.plant.hidden.spring import AIR_K, AIR_UPAS, GasFilm
@@ -30,13 +29,7 @@ def swept(hidden: dict[str, Any] | None, **keys: Any) -> pd.DataFrame:
     recipe = short_recipe().model_copy(update={"device": "SF1500", "procedures": [PART | keys], "soak_min_s": 900.0})
     config = station_of(hidden=[hidden] if hidden else [])
     sink = captured(recipe, lot_of(1, "SF1500"), config, roles=roles_of(recipe))
-    readings = sink.all(1)
-    records = [
-        procedure_record(k, step.order, [sink.records[k][0]], readings[readings["record"] == k])
-        for k, step in enumerate(steps(recipe))
-        if step.order is not None
-    ]
-    return SWEEP.reduce(parts_of(recipe)[0], records, nominal_device(readings))
+    return SWEEP.reduce(parts_of(recipe)[0], *procedure_records(recipe, sink))
 
 
 def judged(rows: pd.DataFrame) -> TransferDiagnosis:

@@ -83,15 +83,12 @@ def chart(name: str = "measured", count: int = 3) -> Chart:
     return Chart(name, (Plot(name, PlotAxis("time / s"), PlotAxis("residual / µg"), (points,)),))
 
 
-def test_the_bundle_is_the_one_of_its_makers() -> None:
+def test_the_bundle_is_the_one_of_its_makers_and_the_policy_admits_the_two_scripts_and_no_other(page: str) -> None:
     folder = files("pipelines.drawing") / "vendor"
     text = gzip.decompress((folder / f"{BUNDLE}.gz").read_bytes())
     assert b"plotly.js (cartesian - minified) v4.1.1" in text[:200]
     assert hashlib.sha256(text).hexdigest() == BUNDLE_SHA256
     assert "Permission is hereby granted" in (folder / "plotly-LICENSE.txt").read_text()
-
-
-def test_the_policy_of_a_report_admits_its_two_scripts_and_no_other(page: str) -> None:
     policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
     assert policy is not None
     assert page.index("Content-Security-Policy") < page.index("<style>")

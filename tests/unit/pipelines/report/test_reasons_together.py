@@ -7,7 +7,7 @@ def row(unit: str, reasons: str, outcome: str = "fail") -> dict[str, str]:
     return {"unit": unit, "reasons": reasons, "outcome": outcome}
 
 
-def test_one_limit_missed_by_many_units_is_one_reason_with_every_value() -> None:
+def test_equal_reasons_are_one_with_every_value_others_stay_apart_and_the_most_frequent_is_first() -> None:
     rows = [
         row(f"B{k:02d}", f"bias_error_ug fail: {1100 + k} ± 20 µg, limit 1000 µg, margin -{100 + k} µg")
         for k in range(32)
@@ -17,9 +17,6 @@ def test_one_limit_missed_by_many_units_is_one_reason_with_every_value() -> None
     assert len(group.units) == 32
     assert group.units[3] == ("B03", "1103 ± 20 µg")
     assert group.sentence.startswith(f"{group.text}: B00 (1100 ± 20 µg), B01 (1101 ± 20 µg)")
-
-
-def test_reasons_of_different_kinds_and_limits_stay_apart_and_the_most_frequent_is_first() -> None:
     rows = [
         row("A", "zero_g_offset_mg fail: -80 mg, limit 75 mg, margin -5 mg"),
         row("B", "constant output 0 LSB on x in record 3; check wiring", "refused"),

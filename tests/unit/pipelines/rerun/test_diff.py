@@ -68,11 +68,17 @@ def test_another_model_is_named_and_changes_stand_against_both_uncertainties(run
     assert ratios == sorted(ratios, reverse=True)  # the largest against uncertainty first
 
 
-def test_a_fresh_measurement_differs_by_its_data(run: Run, tmp_path: Path) -> None:
+def test_a_fresh_measurement_differs_by_its_data_and_runs_without_a_common_unit_are_refused(
+    run: Run, tmp_path: Path
+) -> None:
     archive = Archive(run.archive.root)
     document = diff(run, measured_run(small_job(tmp_path, repeat=1), archive, CaptureDouble(noise_g=2e-4)))
     assert ("data", "") in whats(document)
     assert document["coefficients"]
+    (tmp_path / "other").mkdir()
+    other = small_run(tmp_path / "other", None, ('units = ["A1", "A2", "A3"]', 'units = ["B1", "B2"]'))
+    with pytest.raises(DataRejected, match="no unit in common"):
+        diff(run, other)
 
 
 def test_versions_of_libraries_and_code_are_named(run: Run, larger: Run) -> None:
@@ -88,13 +94,6 @@ def test_versions_of_libraries_and_code_are_named(run: Run, larger: Run) -> None
             (larger.path / f"{name}.json").write_bytes(content)
     named = {(row["what"], row["name"]) for row in document["because"]}
     assert {("library", "numpy"), ("code", "verify")} <= named
-
-
-def test_refuses_runs_without_a_common_unit(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "other").mkdir()
-    other = small_run(tmp_path / "other", None, ('units = ["A1", "A2", "A3"]', 'units = ["B1", "B2"]'))
-    with pytest.raises(DataRejected, match="no unit in common"):
-        diff(run, other)
 
 
 @pytest.mark.parametrize(

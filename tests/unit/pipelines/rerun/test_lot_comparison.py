@@ -142,7 +142,9 @@ def evidence(run: Run) -> GradeEvidence:
     return GradeEvidence(**tables)
 
 
-def test_decisions_are_those_of_the_tables(run: Run, given: tuple[ArchivedJob, BudgetTables, BudgetTerms]) -> None:
+def test_decisions_are_those_of_the_tables_and_nothing_is_known_where_nothing_is_stated(
+    run: Run, given: tuple[ArchivedJob, BudgetTables, BudgetTerms]
+) -> None:
     job, tables, terms = given
     whole = budget(tables, terms)
     of_tables = replace(
@@ -154,9 +156,6 @@ def test_decisions_are_those_of_the_tables(run: Run, given: tuple[ArchivedJob, B
     assert set(alone["grades"]["basis"]) == {"budget"}
     pd.testing.assert_frame_equal(alone["grades"], stated["grades"], check_exact=True)
     pd.testing.assert_frame_equal(grade(without, job.limits)["figures"], stated["figures"], check_exact=True)
-
-
-def test_nothing_is_known_where_nothing_is_stated(given: tuple[ArchivedJob, BudgetTables, BudgetTerms]) -> None:
     _, tables, terms = given
     assert decision_budget(tables, replace(terms, stated=None)) is None
     assert decision_budget(replace(tables, coefficients=tables.coefficients.iloc[:0]), terms) is None

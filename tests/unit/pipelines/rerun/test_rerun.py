@@ -27,16 +27,9 @@ from schemas.errors import DataRejected, WrongUse
 LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
 
 
-@pytest.fixture(scope="module")
-def original(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return small_run(tmp_path_factory.mktemp("rerun"))
-
-
 @pytest.fixture
-def run(original: Run, tmp_path: Path) -> Run:
-    """A run of its own in an archive of its own."""
-    shutil.copytree(original.archive.root, tmp_path / "archive")
-    return Archive(tmp_path / "archive").run(original.id)
+def run(tmp_path: Path) -> Run:
+    return small_run(tmp_path)
 
 
 def hashes(run: Run) -> dict[str, str]:
@@ -78,13 +71,21 @@ def test_other_limits_only_grade_again(run: Run) -> None:
     assert files_of(run) == before
 
 
-def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
+def test_another_model_begins_at_the_fit_and_gives_the_bytes_of_a_first_run_with_it(run: Run, tmp_path: Path) -> None:
     outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
     new = finished(run, outcome)
     assert computed(outcome) == ["fit", "judge", "verify", "noise", "soak_noise", "procedures", "budget", "grade"]
     assert "third_order" in set(new.table("coefficients")["effect"])
     assert new.manifest("dwells")["taken_from"] == run.id
     assert outcome.because[0]["what"] == "model"
+    effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "third_order"]
+    listed = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
+    (tmp_path / "first").mkdir()
+    job = small_job(tmp_path / "first", (listed, f"effects = {json.dumps(effects)}"))
+    first = measured_run(job, Archive(tmp_path / "first" / "archive"), CaptureDouble())
+    outcome = again(run.archive, run.id, change_from_options(effects=",".join(effects)))
+    assert hashes(run.archive.run(outcome.new)) == hashes(first)
+    assert outcome.new == first.id
 
 
 def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,17 +96,6 @@ def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeyp
     ]  # its tables come out with the same bytes, so the key of the grade is the same
     assert [b["what"] for b in outcome.because] == ["code"]
     assert hashes(run.archive.run(outcome.new)) == hashes(run)
-
-
-def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_path: Path) -> None:
-    effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "third_order"]
-    listed = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
-    (tmp_path / "first").mkdir()
-    job = small_job(tmp_path / "first", (listed, f"effects = {json.dumps(effects)}"))
-    first = measured_run(job, Archive(tmp_path / "first" / "archive"), CaptureDouble())
-    outcome = again(run.archive, run.id, change_from_options(effects=",".join(effects)))
-    assert hashes(run.archive.run(outcome.new)) == hashes(first)
-    assert outcome.new == first.id
 
 
 TROUBLE = (KeyboardInterrupt(), DataRejected("verify: no pose"), ValueError("a defect"))
@@ -230,9 +220,9 @@ def test_chooses_runs_by_what_they_are(run: Run) -> None:
     (["smale"], "no run is called 'smale'; known: small-"),
     (["until:1999-12-31"], "none of 1 runs is until:1999-12-31; measured"),
 ])  # fmt: skip
-def test_says_why_a_selection_names_nothing(row: tuple[list[str], str], original: Run) -> None:
+def test_says_why_a_selection_names_nothing(row: tuple[list[str], str], run: Run) -> None:
     with pytest.raises(WrongUse, match=row[1]):
-        selected(original.archive, row[0])
+        selected(run.archive, row[0])
 
 
 @pytest.fixture

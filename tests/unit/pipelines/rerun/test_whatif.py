@@ -71,7 +71,9 @@ def better(archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> tuple[
     return change, what_if(archive, change)
 
 
-def test_a_model_with_the_missing_effect_is_better_on_fresh_runs_and_in_yield(better: tuple[ModelChange, dict]) -> None:
+def test_a_model_with_the_missing_effect_is_better_on_fresh_runs_and_in_yield_and_is_what_a_rerun_makes(
+    better: tuple[ModelChange, dict], archive: Archive
+) -> None:
     _, document = better
     total = document["total"]
     assert document["verdict"] == "better"
@@ -81,9 +83,6 @@ def test_a_model_with_the_missing_effect_is_better_on_fresh_runs_and_in_yield(be
     assert total["yield"] == [0.0, 1.0]
     assert len(document["flips"]["to_pass"]) == 6
     assert [(row["device"], row["station"]) for row in document["groups"]] == [("adxl355", "simulated")]
-
-
-def test_the_new_side_is_what_a_rerun_makes(archive: Archive, better: tuple[ModelChange, dict]) -> None:
     change, _ = better
     run = archive.runs()[0].id
     side = judged(Batch(archive.address, (run,), change))[0].sides[1]
@@ -136,14 +135,13 @@ def test_a_fit_of_measured_data_is_no_measurement_and_no_fresh_run(
     assert fresh_tasks(both, own.address, change) == []
 
 
-def test_a_model_that_was_there_already_is_no_better(archive: Archive, tmp_path: Path) -> None:
+def test_a_model_that_was_there_is_no_better_and_a_lot_that_it_cannot_be_fitted_to_is_named(
+    archive: Archive, tmp_path: Path
+) -> None:
     same = change_from_options("", model_file(tmp_path, GOOD[:-1]))
     document = what_if(archive, same)
     assert document["verdict"] == "no better"
     assert document["total"]["fresh_rms_ug"][0] == pytest.approx(document["total"]["fresh_rms_ug"][1])
-
-
-def test_a_lot_that_the_model_cannot_be_fitted_to_is_named(archive: Archive, tmp_path: Path) -> None:
     document = what_if(archive, change_from_options("", model_file(tmp_path, (*GOOD, "bias_temperature_quadratic"))))
     assert document["verdict"] == "nothing to judge"
     assert all("bias_temperature_quadratic" in row["error"] for row in document["failed"])

@@ -74,21 +74,18 @@ def evidence(*, silent: bool) -> GradeEvidence:
     return GradeEvidence(verdicts, coefficients, covariance, residuals, empty, empty, noise_rows(silent=silent))
 
 
-def test_figures_without_a_limit_carry_the_k_of_the_limits() -> None:
-    tables = grade(evidence(silent=False), parse_limits(LIMITS, "test", UNITS))
-    own = tables["figures"].set_index("figure")
-    u = 5.0 / np.sqrt(2.0) / np.sqrt(4.0)
-    assert own.loc["residual_rms_ug", "uncertainty"] == pytest.approx(2.5 * u)
-    assert own.loc["residual_rms_ug", "outcome"] == "no limit"
-
-
-def test_a_silent_axis_passes_no_limit_and_is_named() -> None:
+def test_a_silent_axis_passes_no_limit_and_is_named_and_figures_without_a_limit_carry_the_k_of_the_limits() -> None:
     tables = grade(evidence(silent=True), parse_limits(LIMITS, "test", UNITS))
     row = tables["grades"].iloc[0]
     assert row["outcome"] == "fail"
     assert "velocity_random_walk_ug_rtHz: not determined (axis y: the output never changed)" in row["reasons"]
     assert np.isfinite(tables["figures"]["value"]).all()
     assert grade(evidence(silent=False), parse_limits(LIMITS, "test", UNITS))["grades"].iloc[0]["outcome"] == "pass"
+    tables = grade(evidence(silent=False), parse_limits(LIMITS, "test", UNITS))
+    own = tables["figures"].set_index("figure")
+    u = 5.0 / np.sqrt(2.0) / np.sqrt(4.0)
+    assert own.loc["residual_rms_ug", "uncertainty"] == pytest.approx(2.5 * u)
+    assert own.loc["residual_rms_ug", "outcome"] == "no limit"
 
 
 def test_the_rms_error_carries_the_uncertainty_of_its_covariance_where_the_run_has_it() -> None:

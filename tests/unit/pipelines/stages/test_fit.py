@@ -104,13 +104,12 @@ def test_a_model_without_scale_has_residuals_by_the_unit_of_its_output(rng, unit
     assert np.isfinite(fitted["wander"]["white_ug"]).all()
 
 
-def test_a_model_without_scale_of_counts_is_refused_with_what_it_needs(rng: np.random.Generator) -> None:
+def test_a_model_without_scale_of_counts_is_refused_and_too_few_dwells_for_the_noise_are_told(
+    rng: np.random.Generator,
+) -> None:
     dwells, _ = lot(rng, units=2)
     with pytest.raises(DataRejected, match=r"no 'scale', and the outputs are in LSB.* add 'scale'"):
         fit(dwells.assign(out_unit="LSB"), NO_HISTORY, ["bias", "bias_temperature"])
-
-
-def test_says_so_where_there_are_too_few_dwells_for_the_noise(rng: np.random.Generator) -> None:
     dwells, _ = lot(rng, units=1)
     few = dwells[dwells["dwell"] < 5]
     fitted = fit(few, NO_HISTORY, ["bias", "scale", "misalignment"])

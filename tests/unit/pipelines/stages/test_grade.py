@@ -95,7 +95,7 @@ def test_decides_by_the_agreed_rule(row: tuple[str, float, str, str]) -> None:
     assert decisions[0].accept == accept
 
 
-def test_a_least_value_says_its_side_its_margin_and_its_risk() -> None:
+def test_a_least_value_says_its_side_margin_and_risk_and_is_refused_where_the_largest_axis_is_kept(tmp_path) -> None:
     own = parse_limits(LEAST.format(rule="guarded_acceptance"), "test", UNITS)
     decision = decide(own, "sweep_bandwidth_hz", 780.0, 5.0)
     assert "limit at least 800 Hz, margin -20 Hz" in decision.sentence
@@ -109,9 +109,6 @@ def test_a_least_value_says_its_side_its_margin_and_its_risk() -> None:
         for axis, value in (("x", 950.0), ("y", 805.0), ("z", 990.0))
     ]  # fmt: skip
     assert [one.of.value for one in _of_procedures(pd.DataFrame(rows), "A", own)] == [805.0]  # the smallest of the axes
-
-
-def test_a_least_value_of_a_figure_of_which_the_largest_axis_is_kept_is_refused(tmp_path) -> None:
     (tmp_path / "least.toml").write_text(
         'name = "least"\n[figures]\nturn_on_repeatability_ug = { min = 5.0, unit = "µg" }\n', encoding="utf-8"
     )

@@ -19,7 +19,9 @@ from schemas.errors import DataRejected
 NO_HISTORY = pd.DataFrame({"time_s": [], "chamber_C": [], "slot": [], "unit": [], "unit_C": []})
 
 
-def test_reduce_gives_means_spreads_numbers_and_the_reference_in_standard_g(run: Run) -> None:
+def test_reduce_gives_means_spreads_numbers_and_the_reference_and_verification_and_noise_are_those_of_the_double(
+    run: Run,
+) -> None:
     samples, dwells = run.table("samples"), run.table("dwells")
     row = dwells.iloc[4]
     own = samples[(samples["unit"] == row["unit"]) & (samples["record"] == row["record"])]
@@ -29,6 +31,14 @@ def test_reduce_gives_means_spreads_numbers_and_the_reference_in_standard_g(run:
     norm = np.linalg.norm(dwells[["force_x", "force_y", "force_z"]], axis=1)
     np.testing.assert_allclose(norm, 9.8123 / STANDARD_G, rtol=1e-12)
     assert set(dwells["kind"]) == {"dwell", "verification"}  # without the static record
+    verification = run.table("verification")
+    assert (verification["error_ug"].abs() < 5.0 * verification["uncertainty_ug"]).all()
+    assert (verification["reading_ug"] < verification["uncertainty_ug"]).all()
+    noise = run.table("noise").set_index(["unit", "axis", "term"])
+    expected = 1e-4 / np.sqrt(100.0) * 1e6
+    assert np.isclose(noise.loc[("A1", "x", "N"), "value"], expected, rtol=0.1)
+    assert np.isclose(noise.loc[("A1", "x", "n_d"), "value"], np.sqrt(2.0) * expected, rtol=0.1)
+    assert not noise.loc[("A1", "x", "B"), "identified"]
 
 
 def test_fit_finds_what_the_devices_are(run: Run, tmp_path: Path) -> None:
@@ -56,17 +66,6 @@ def test_lack_of_fit_widens_the_uncertainty(run: Run) -> None:
     )
     ratio = (wider["standard_error"] / straight["standard_error"]).loc[("A1", "x", "bias")]
     assert ratio > 3.0
-
-
-def test_verification_errors_and_noise_are_those_of_the_double(run: Run) -> None:
-    verification = run.table("verification")
-    assert (verification["error_ug"].abs() < 5.0 * verification["uncertainty_ug"]).all()
-    assert (verification["reading_ug"] < verification["uncertainty_ug"]).all()
-    noise = run.table("noise").set_index(["unit", "axis", "term"])
-    expected = 1e-4 / np.sqrt(100.0) * 1e6
-    assert np.isclose(noise.loc[("A1", "x", "N"), "value"], expected, rtol=0.1)
-    assert np.isclose(noise.loc[("A1", "x", "n_d"), "value"], np.sqrt(2.0) * expected, rtol=0.1)
-    assert not noise.loc[("A1", "x", "B"), "identified"]
 
 
 def test_units_with_different_dwells_or_units_of_output_are_not_fitted_together(run: Run) -> None:

@@ -31,12 +31,19 @@ from schemas.errors import WrongUse
 TOKEN = "Zq8vXy3nR5tB7wK1mP4sD9"
 
 
+def client_of(archive: object, folder: Path) -> AsgiClient:
+    return AsgiClient(create_app(settings_of(archive, folder)), "http://127.0.0.1:8321")
+
+
+def settings_of(archive: object, folder: Path) -> WorkbenchSettings:
+    return WorkbenchSettings(archive=str(archive), folder=folder / "bench", token=TOKEN)
+
+
 def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_archive(tmp_path / "archive", 6, years=2.0, seed=3, workers=1)
-    settings = WorkbenchSettings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token=TOKEN)
-    _, content = requests.audit(settings, AuditPage())
+    _, content = requests.audit(settings_of(tmp_path / "archive", tmp_path), AuditPage())
     end, audited = done_in_process("audit", content, lambda *_: None)
     assert end == "done", audited
     capability = audited["document"]["population"]["capability"]
@@ -44,7 +51,7 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
     assert others
     figure["cpk"] = None
     monkeypatch.setattr(Jobs, "result", lambda *_: audited)
-    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+    client = client_of(tmp_path / "archive", tmp_path)
     assert figure["figure"] in client.get("/audit/capability.csv").text
     heads = client.get("/audit/capability.csv").text.splitlines()[0].split(",")
     assert {"ppk_low", "cpk_low"} <= set(heads)
@@ -57,10 +64,9 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
 def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = wafer_line(tmp_path)
     add_attributes(Archive(str(made.folder)), pd.read_csv(made.units, dtype=str), "serial", "units.csv")
-    settings = WorkbenchSettings(archive=str(made.folder), folder=tmp_path / "bench", token=TOKEN)
-    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+    client = client_of(made.folder, tmp_path)
     assert client.get("/discover").status_code == 200  # before it was asked for
-    _, content = requests.discover(settings, DiscoverPage())
+    _, content = requests.discover(settings_of(made.folder, tmp_path), DiscoverPage())
     end, found = done_in_process("discover", content, lambda *_: None)
     assert end == "done", found
     monkeypatch.setattr(Jobs, "result", lambda *_: found)
@@ -88,19 +94,17 @@ def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch:
 def test_the_page_of_a_run_has_the_verdict_of_its_archive(
     verdict: str, reason: str, shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = small_run(tmp_path)
+    run, read = small_run(tmp_path), Run.table
     own = run.table("verdict").assign(verdict=verdict, reason=reason)
-    read = Run.table
     monkeypatch.setattr(Run, "table", lambda self, name: own if name == "verdict" else read(self, name))
-    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
-    page = AsgiClient(create_app(settings), "http://127.0.0.1:8321").get(f"/run?run={run.id}")
-    assert shown in page.text
+    assert shown in client_of(run.archive.root, tmp_path).get(f"/run?run={run.id}").text
 
 
-def test_figures_and_coefficients_have_their_expanded_uncertainty_once(tmp_path: Path) -> None:
+def test_a_unit_has_figures_and_coefficients_with_u_once_and_residuals_against_what_they_depend_on(
+    tmp_path: Path,
+) -> None:
     run = small_run(tmp_path)
-    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
-    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+    client = client_of(run.archive.root, tmp_path)
     page = client.get(f"/unit?run={run.id}&unit=A1").text
     figures = run.table("figures")
     own = figures[(figures["unit"] == "A1") & (figures["uncertainty"] > 0.0)]
@@ -115,6 +119,10 @@ def test_figures_and_coefficients_have_their_expanded_uncertainty_once(tmp_path:
     first = coefficients[coefficients["unit"] == "A1"].iloc[0]
     value, expanded = with_uncertainty(first["value"], 2.0 * first["standard_error"])
     assert f"{value}<br><small>± {expanded}</small>" in page
+    adequate = bool((run.table("verdict")["verdict"] == "adequate").all())
+    assert ('<option value="force" selected>' in page) == adequate
+    chart = client.get(f"/unit/figure/residuals.json?run={run.id}&unit=A1&against=time").json()
+    assert sum("error_y" in trace for trace in chart["data"]) == 3
 
 
 def cubic_lot(folder: Path) -> WorkbenchSettings:
@@ -122,7 +130,7 @@ def cubic_lot(folder: Path) -> WorkbenchSettings:
     (folder / "bench").mkdir()
     dwells = lot(np.random.default_rng(5), units=2, temperatures=(25.0,), hidden=lambda force, *_: 2e-4 * force**3)
     dwells.to_parquet(folder / "bench" / "cubic.parquet")
-    return WorkbenchSettings(archive=str(folder / "archive"), folder=folder / "bench", token=TOKEN)
+    return settings_of(folder / "archive", folder)
 
 
 def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_the_change_of_coefficients(
@@ -166,32 +174,18 @@ def test_the_u_of_a_difference_is_that_of_the_larger_model_and_of_models_beside_
         assert _worded(row, sides)["difference"] == with_uncertainty(1.0, expanded)
 
 
-def test_two_runs_stand_side_by_side_with_their_differences(tmp_path: Path) -> None:
+def test_two_runs_stand_side_by_side_with_k_of_the_first_and_imports_of_two_files_are_two_measurements(
+    tmp_path: Path,
+) -> None:
     run = small_run(tmp_path)
     again = measured_run(small_job(tmp_path, repeat=1), run.archive, CaptureDouble(noise_g=2e-4))
-    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
-    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+    client = client_of(run.archive.root, tmp_path)
     text = client.get(f"/run?run={run.id}&beside={again.id}").text
     own, its = (one.table("figures").set_index(["unit", "figure"]).loc["A1", "bias_error_ug"] for one in (run, again))
     change, expanded = with_uncertainty(own["value"] - its["value"], np.hypot(own["uncertainty"], its["uncertainty"]))
     assert f"Δ {change} ± {expanded}</small>" in text
     other = client.get(f"/run?run={run.id}&beside={run.id}").text  # the same noise in both: no U of the difference
     assert "Δ 0</small>" in other or "Δ 0.000</small>" in other
-
-
-def rewritten(run: Run, **entries: object) -> None:
-    """A run's ``run.json`` with other entries, as an import or other limits would have written it."""
-    path = run.path / START
-    path.write_text(json.dumps({**run.about, **entries}), encoding="utf-8")
-
-
-def test_the_difference_of_two_runs_has_k_of_the_first_and_imports_of_two_files_are_two_measurements(
-    tmp_path: Path,
-) -> None:
-    run = small_run(tmp_path)
-    again = measured_run(small_job(tmp_path, repeat=1), run.archive, CaptureDouble(noise_g=2e-4))
-    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
-    own, its = (one.table("figures").set_index(["unit", "figure"]).loc["A1", "bias_error_ug"] for one in (run, again))
     change = own["value"] - its["value"]
     k = {run: 2.5, again: float(again.about["limits"]["coverage_factor"])}
     standard = np.hypot(own["uncertainty"] / k[run], its["uncertainty"] / k[again])
@@ -200,22 +194,16 @@ def test_the_difference_of_two_runs_has_k_of_the_first_and_imports_of_two_files_
     for other, with_u in (("b" * 64, True), ("a" * 64, False)):
         rewritten(run, limits=limits, capture="", source={"sha256": "a" * 64})
         rewritten(again, capture="", source={"sha256": other})
-        client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
-        text = client.get(f"/run?run={run.id}&beside={again.id}").text
+        text = client_of(run.archive.root, tmp_path).get(f"/run?run={run.id}&beside={again.id}").text
         assert "with its U, k = 2.5, for measurements" in text
         assert (f"Δ {told} ± {expanded}</small>" in text) is with_u
         assert ("± " in text[text.index("data-two-runs") :].partition("</table>")[0]) is with_u
 
 
-def test_residuals_are_drawn_against_what_they_depend_on_with_bars_of_the_noise(tmp_path: Path) -> None:
-    run = small_run(tmp_path)
-    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
-    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
-    adequate = bool((run.table("verdict")["verdict"] == "adequate").all())
-    page = client.get(f"/unit?run={run.id}&unit=A1").text
-    assert ('<option value="force" selected>' in page) == adequate
-    chart = client.get(f"/unit/figure/residuals.json?run={run.id}&unit=A1&against=time").json()
-    assert sum("error_y" in trace for trace in chart["data"]) == 3
+def rewritten(run: Run, **entries: object) -> None:
+    """A run's ``run.json`` with other entries, as an import or other limits would have written it."""
+    path = run.path / START
+    path.write_text(json.dumps({**run.about, **entries}), encoding="utf-8")
 
 
 def test_residuals_follow_the_quantity_that_makes_them() -> None:

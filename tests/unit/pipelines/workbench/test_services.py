@@ -210,7 +210,9 @@ def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Workben
             models.save(settings, name, start, ["third_order"], [], why, "")
 
 
-def test_only_files_of_the_folder_are_sources(settings: WorkbenchSettings, tmp_path: Path) -> None:
+def test_files_of_the_folder_alone_are_sources_and_an_upload_stays_in_it_whatever_it_is_called(
+    settings: WorkbenchSettings, tmp_path: Path
+) -> None:
     settings.folder.mkdir()
     frame = pd.DataFrame({"unit": ["U"], "dwell": [0]})
     for name in ("dwells.csv", "fresh.csv", "dwells-history.csv"):
@@ -223,8 +225,6 @@ def test_only_files_of_the_folder_are_sources(settings: WorkbenchSettings, tmp_p
         with pytest.raises(WrongUse):
             sources.resolve(settings, name, "source")
 
-
-def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: WorkbenchSettings) -> None:
     def keep(name: str, content: bytes) -> str:
         part = uploads.part_of(settings)
         part.write_bytes(content)

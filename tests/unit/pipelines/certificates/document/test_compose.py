@@ -16,9 +16,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from capture_double import small_run
+from in_process import document_of, refused
+from in_process import text_of as printed
 from laboratory import LABORATORY, laboratory_file
-from pydantic import TypeAdapter
-from typer.testing import CliRunner, Result
 
 from pipelines.archive import Archive, Run
 from pipelines.certificates import Ledger
@@ -30,10 +30,8 @@ from pipelines.certificates.document.issue import pdf
 from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
 from pipelines.certificates.document.numbers import si_unit, with_uncertainty
 from pipelines.certificates.document.pages import page_content
-from pipelines.certificates.documents import CertificateDocument
 from pipelines.certificates.stated_budget import StatedBudget
 from pipelines.chain.certify import certify
-from pipelines.cli import app
 from pipelines.report.numbers import with_uncertainty as report_rounding
 from pipelines.report.unit_panels.budget import render as budget_panel
 from schemas.errors import RecipeInvalid, WrongUse
@@ -44,7 +42,7 @@ pytest.importorskip("typst")
 pikepdf = pytest.importorskip("pikepdf")
 pdfplumber = pytest.importorskip("pdfplumber")
 
-Typed = Callable[..., Result]
+Typed = Callable[..., tuple[object, ...]]
 NAMES = {"dcc": DCC, "si": SI}
 ACCREDITATION = '[laboratory.accreditation]\nbody = "DAkkS"\nnumber = "D-K-00000-01"\n'
 
@@ -85,11 +83,9 @@ def laboratory(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def typed(run: Run, laboratory: Path, tmp_path: Path) -> Typed:
-    def type_(*words: str, command: str = "write") -> Result:
-        own = ["--laboratory", str(laboratory), "--output", str(tmp_path / "out")] if command == "write" else []
-        return CliRunner().invoke(app, ["certificate", command, *words, *own, "--archive", str(run.archive.root)])
-
-    return type_
+    """The words of the command that writes certificates."""
+    own = ("--laboratory", laboratory, "--output", tmp_path / "out", "--archive", run.archive.root)
+    return lambda *words: ("certificate", "write", *words, *own)
 
 
 def content(run: Run, serial: str = "A1", text: str = LABORATORY) -> CertificateContent:
@@ -106,10 +102,7 @@ def text_of(document: bytes) -> list[str]:
 def test_a_run_gives_a_pdf_and_an_xml_per_certified_unit_and_names_those_without(
     run: Run, typed: Typed, tmp_path: Path
 ) -> None:
-    done = typed(run.id, "--json")
-    assert done.exit_code == 1
-    TypeAdapter(CertificateDocument).validate_json(done.stdout, strict=True, extra="forbid")
-    document = json.loads(done.stdout)
+    document = document_of(*typed(run.id), status=1)
     assert [one["certificate"] for one in document["certificates"]] == ["A1/1", "A2/1"]
     assert "refused, no certificate: stopped answering" in document["left_out"]["A3"]
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
@@ -121,24 +114,20 @@ def test_a_run_gives_a_pdf_and_an_xml_per_certified_unit_and_names_those_without
 def test_a_certificate_has_the_same_bytes_again_and_none_is_made_of_what_has_or_holds_none(
     run: Run, typed: Typed, tmp_path: Path
 ) -> None:
-    problem = typed("A1", "A3").exception
-    assert isinstance(problem, WrongUse)
-    assert re.search(
-        r"unit A3 has no certificate, one is needed; run .*: refused, no certificate: stopped", str(problem)
-    )
+    told = r"unit A3 has no certificate, one is needed; run .*: refused, no certificate: stopped"
+    assert re.search(told, refused(*typed("A1", "A3")))
     assert not (tmp_path / "out").exists()  # not even that of A1
-    assert "A1/7 is not in the ledger, there are A1/1" in str(typed("A1/7").exception)
+    assert "A1/7 is not in the ledger, there are A1/1" in refused(*typed("A1/7"))
     made = []
     for words in ("A1", "A1/1"):
-        assert typed(words).exit_code == 0
+        printed(*typed(words), status=0)
         made.append({path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()})
     assert made[0] == made[1]
-    assert typed("A1", "--reason", "dropped", command="revoke").exit_code == 0
-    assert "certificate A1/1 of run" in str(typed("A1").exception)
-    assert "was revoked (dropped)" in str(typed("A1").exception)
+    printed("certificate", "revoke", "A1", "--reason", "dropped", "--archive", run.archive.root, status=0)
+    assert re.search(r"certificate A1/1 of run .* was revoked \(dropped\)", refused(*typed("A1")))
 
 
-def test_an_amended_certificate_names_the_one_it_replaces_and_what_changed(run: Run, typed: Typed) -> None:
+def test_an_amended_certificate_names_the_one_it_replaces_and_what_changed(run: Run) -> None:
     again = certify(Ledger(run.archive), run, ["A1"], months=6, reason="validity corrected to six months")
     assert again.written[0].certificate == "A1/2"
     page = " ".join(text_of(pdf(content(run), dcc(content(run))))[0].split())
@@ -234,17 +223,6 @@ def test_values_of_the_xml_are_those_of_the_archive_in_si_units(made: Run, xml: 
     assert si_unit("furlong") is None
 
 
-def test_nothing_says_accredited_without_an_accreditation_in_the_file(
-    made: Run, laboratory: Path, xml: bytes, paper: bytes
-) -> None:
-    assert not re.search("accredit", " ".join(text_of(paper)) + xml.decode(), re.IGNORECASE)
-    laboratory.write_text(LABORATORY.replace("Example Sensor Works", "Accredited Sensor Works"), encoding="utf-8")
-    with pytest.raises(RecipeInvalid, match=r"laboratory.name: speaks of accreditation, \[laboratory.accreditation\]"):
-        read_laboratory(laboratory)
-    c = content(made, text=LABORATORY + ACCREDITATION)
-    assert "D-K-00000-01 (DAkkS)" in text_of(pdf(c, dcc(c)))[0]
-
-
 def test_an_interval_is_printed_only_where_the_customer_agreed(
     made: Run, paper: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -333,7 +311,9 @@ def test_u_has_two_digits_and_the_value_ends_where_u_ends_in_certificate_and_rep
         assert with_uncertainty(value, expanded) == report_rounding(value, expanded) == shown
 
 
-def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
+def test_a_laboratory_file_with_a_slip_is_refused_and_nothing_says_accredited_without_an_accreditation_in_it(
+    laboratory: Path, made: Run, xml: bytes, paper: bytes
+) -> None:
     for old, new, why in (
         ('country = "DE"', 'country = "Germany"', r"laboratory\.country"),
         ("[customer]", "[costumer]", "unknown key 'costumer'"),
@@ -345,6 +325,12 @@ def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
             read_laboratory(laboratory)
     with pytest.raises(WrongUse, match=r"is not there, one with \[laboratory\]"):
         read_laboratory(laboratory.parent / "none.toml")
+    assert not re.search("accredit", " ".join(text_of(paper)) + xml.decode(), re.IGNORECASE)
+    laboratory.write_text(LABORATORY.replace("Example Sensor Works", "Accredited Sensor Works"), encoding="utf-8")
+    with pytest.raises(RecipeInvalid, match=r"laboratory.name: speaks of accreditation, \[laboratory.accreditation\]"):
+        read_laboratory(laboratory)
+    c = content(made, text=LABORATORY + ACCREDITATION)
+    assert "D-K-00000-01 (DAkkS)" in text_of(pdf(c, dcc(c)))[0]
 
 
 def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
@@ -357,7 +343,7 @@ def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
     assert "not claimed" in traceability(StatedBudget(**own, references=(), grade_source="data_sheet"), entries)
 
 
-def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(
+def test_the_certificate_states_the_verdict_with_p_what_u_does_not_contain_and_no_probability_of_0(
     c: CertificateContent, xml: bytes
 ) -> None:
     assert re.fullmatch(r"ADEQUATE \(p (= 0\.\d+|= 1)\)", c.adequacy)
@@ -369,9 +355,6 @@ def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(
     assert c.left_out in declared
     assert c.adequacy in printed
     assert c.left_out in printed
-
-
-def test_a_probability_of_false_acceptance_is_never_0_and_rows_of_nothing_are_one(c: CertificateContent) -> None:
     none = c.model_copy(update={"conformity": tuple(one.model_copy(update={"pfa": 0.0}) for one in c.conformity)})
     assert "probability of false acceptance < 1e-4" in html.unescape(dcc(none).decode())
     parts = {part.get("title"): part for part in page_content(c)["parts"]}

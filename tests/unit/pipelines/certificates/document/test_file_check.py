@@ -17,10 +17,9 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, utils
 from cryptography.hazmat.primitives.serialization import Encoding
 from each import each
+from in_process import document_of, given, refused, text_of, typed_document
 from laboratory import laboratory_file
-from pydantic import TypeAdapter
 from signing_keys import made_key, openssl_accepts, pem, self_signed
-from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
 from pipelines.certificates import Calibration, Ledger
@@ -32,10 +31,7 @@ from pipelines.certificates.document.issue import issue
 from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
 from pipelines.certificates.document.signature_check import canonical, parsed, xml_signature
 from pipelines.certificates.document.signing import SigningKey, sign_pdf, sign_xml
-from pipelines.certificates.documents import CertificateCheckDocument, CertifyDocument
 from pipelines.chain.certify import certify
-from pipelines.cli import app
-from schemas.errors import WrongUse
 
 etree = pytest.importorskip("lxml.etree")
 xmlschema = pytest.importorskip("xmlschema")
@@ -60,17 +56,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Issued:
     folder = tmp_path_factory.mktemp("issued")
     run = small_run(folder)
     run.seal()
-    done = CliRunner().invoke(app, ["certificate", "issue", run.id, "--archive", str(run.archive.root), "--json"])
-    TypeAdapter(CertifyDocument).validate_json(done.stdout, strict=True, extra="forbid")
+    document_of("certificate", "issue", run.id, "--archive", run.archive.root)
     key = made_key(ec.generate_private_key(ec.SECP256R1()))
     who = laboratory_file(folder)
     (folder / "key.pem").write_bytes(pem(key))
     (folder / "trust.pem").write_bytes(key.certificate.public_bytes(Encoding.PEM))
-    words = ["certificate", "write", run.id, "--laboratory", str(who), "--archive", str(run.archive.root)]
-    signed = ["--sign-with", str(folder / "key.pem"), "--address", "https://example.org/{number}"]
-    for out, more in (("signed", signed), ("unsigned", [])):
-        done = CliRunner().invoke(app, [*words, "--output", str(folder / out), *more])
-        assert done.exit_code == 0, done.output
+    words = ("certificate", "write", run.id, "--laboratory", who, "--archive", run.archive.root, "--output")
+    text_of(*words, folder / "unsigned", status=0)
+    signed = ("--sign-with", folder / "key.pem", "--address", "https://example.org/{number}")
+    text_of(*words, folder / "signed", *signed, status=0)
     return Issued(run, key, folder, folder / "trust.pem")
 
 
@@ -83,14 +77,11 @@ def issued(made: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iss
 
 
 def checked(*words: object, status: int | None = None) -> dict:
-    """The document that the command prints, after its type was checked; ``status`` : that is expected."""
-    done = CliRunner().invoke(app, ["verify", *map(str, words), "--json"])
-    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-    TypeAdapter(CertificateCheckDocument).validate_json(done.stdout, strict=True, extra="forbid")
-    document = json.loads(done.stdout)
-    assert done.exit_code == (0 if document["accepted"] else 1)
-    if status is not None:
-        assert done.exit_code == status, done.stdout
+    """The document that the command prints, of its type; ``status`` : that is expected."""
+    code, out, _ = given("verify", *words, "--json")
+    document = typed_document("verify", out)
+    assert code == (0 if document["accepted"] else 1)
+    assert status in {None, code}, out
     return document
 
 
@@ -137,7 +128,9 @@ def schema_accepts(document: bytes) -> bool:
 # files as they were issued --------------------------------------------------------------------------------------------
 
 
-def test_signed_files_are_accepted_from_the_file_alone_and_by_second_programs(issued: Issued, tmp_path: Path) -> None:
+def test_signed_files_are_accepted_alone_with_the_archive_and_by_second_programs(
+    issued: Issued, tmp_path: Path
+) -> None:
     files = [issued.folder / f"A1_1.{end}" for end in ("pdf", "xml", "xml.sig")]
     document = checked(*files, "--trust", issued.trust, status=0)
     assert [one["certificate"] for one in document["files"]] == ["A1/1"] * 3
@@ -145,20 +138,19 @@ def test_signed_files_are_accepted_from_the_file_alone_and_by_second_programs(is
     assert openssl_accepts(files[0].read_bytes(), issued.trust, tmp_path)
     assert own_implementation_accepts(files[2].read_bytes(), issued.key)
     assert schema_accepts(files[1].read_bytes())
-
-
-def test_with_the_archive_the_numbers_are_compared_and_the_state_is_told(issued: Issued) -> None:
     words = (issued.folder / "A1_1.pdf", "--trust", issued.trust, "--archive", issued.run.archive.root)
     checks = {one["check"]: one for one in checked(*words, status=0)["files"][0]["checks"]}
     assert checks["archive"]["state"] == checks["state"]["state"] == "good"
     assert int(checks["archive"]["message"].split()[0]) > 20
     assert "not proven by the archive: laboratory: Example Sensor Works" in checks["laboratory"]["message"]
+    Archive(tmp_path / "archive").prepare()  # of somebody else, who receives the certificate
+    document = checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=0)
+    assert "has no certificate A1/1" in json.dumps(document)
 
 
 def test_a_good_signature_of_anybody_proves_nothing(issued: Issued) -> None:
-    document = checked(issued.folder / "A1_1.pdf", status=1)
-    assert not wrong(document)
-    printed = CliRunner().invoke(app, ["verify", str(issued.folder / "A1_1.pdf")]).stdout
+    assert not wrong(checked(issued.folder / "A1_1.pdf", status=1))
+    printed = text_of("verify", issued.folder / "A1_1.pdf", status=1)
     assert "nothing shows where the file comes from; give --trust FILE" in printed
 
 
@@ -169,8 +161,8 @@ def test_an_unsigned_xml_is_proven_by_the_archive_with_the_laboratorys_file_and_
     alone = checked(folder / "A1_1.xml", *archive, status=1)
     assert not wrong(alone)
     assert "Example Drones Ltd" in json.dumps(alone)
-    printed = CliRunner().invoke(app, ["verify", *map(str, (folder / "A1_1.xml", *archive))]).stdout
-    assert "names and addresses are not proven by the archive: give --laboratory FILE" in " ".join(printed.split())
+    printed = text_of("verify", folder / "A1_1.xml", *archive, status=1)
+    assert "names and addresses are not proven by the archive: give --laboratory FILE" in printed
     archive = (*archive, "--laboratory", made.folder / "laboratory.toml")
     assert checked(folder / "A1_1.xml", *archive, status=0)["files"][0]["proven_by"] == ["archive"]
     document = checked(folder / "A1_1.pdf", *archive, status=1)
@@ -282,18 +274,6 @@ def changed_digit(xml: bytes) -> bytes:
     return xml[:place] + digit + xml[place + 1 :]
 
 
-def test_a_changed_digit_is_found_by_the_signature_the_other_implementation_and_the_archive(issued: Issued) -> None:
-    xml, signature = (issued.folder / f"A1_1.{end}" for end in ("xml", "xml.sig"))
-    xml.write_bytes(changed_digit(xml.read_bytes()))
-    messages = wrong(checked(xml, "--trust", issued.trust, status=1))
-    assert messages == {"signature": "A1_1.xml.sig signs another document than this file"}
-    signature.write_bytes(changed_digit(signature.read_bytes()))
-    assert "does not hold" in wrong(checked(signature, "--trust", issued.trust, status=1))["signature"]
-    assert not own_implementation_accepts(signature.read_bytes(), issued.key)
-    signature.unlink()
-    assert "the file says" in wrong(checked(xml, "--archive", issued.run.archive.root, status=1))["archive"]
-
-
 def test_every_changed_byte_of_a_signed_pdf_is_found_as_by_openssl(issued: Issued, tmp_path: Path) -> None:
     path = issued.folder / "A1_1.pdf"
     whole = path.read_bytes()
@@ -389,10 +369,21 @@ def test_a_file_that_is_cut_or_holds_other_bytes_is_wrong_and_never_a_traceback(
         assert wrong(checked(path, "--trust", issued.trust, status=1)), (len(data), data[:20])
 
 
-def test_an_attachment_that_is_not_the_xml_beside_it_is_found(issued: Issued) -> None:
+def test_an_attachment_or_a_digit_that_differs_is_found_by_signature_archive_and_the_other_implementation(
+    issued: Issued,
+) -> None:
     shutil.copy(issued.folder / "A2_1.xml", issued.folder / "A1_1.xml")
     messages = wrong(checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=1))
     assert messages == {"attachment": "the attached XML differs from A1_1.xml"}
+    xml, signature = (issued.folder / f"A1_1.{end}" for end in ("xml", "xml.sig"))
+    xml.write_bytes(changed_digit(xml.read_bytes()))
+    messages = wrong(checked(xml, "--trust", issued.trust, status=1))
+    assert messages == {"signature": "A1_1.xml.sig signs another document than this file"}
+    signature.write_bytes(changed_digit(signature.read_bytes()))
+    assert "does not hold" in wrong(checked(signature, "--trust", issued.trust, status=1))["signature"]
+    assert not own_implementation_accepts(signature.read_bytes(), issued.key)
+    signature.unlink()
+    assert "the file says" in wrong(checked(xml, "--archive", issued.run.archive.root, status=1))["archive"]
 
 
 def test_an_xml_that_the_schema_does_not_allow_is_found_as_by_the_second_program(issued: Issued) -> None:
@@ -457,13 +448,6 @@ def test_a_certificate_superseded_by_a_later_run_is_told_and_the_later_one_stays
     assert checked(*words, status=0)["files"][0]["proven_by"] == ["archive"]
 
 
-def test_an_archive_that_is_only_there_by_chance_is_not_demanded(issued: Issued, tmp_path: Path) -> None:
-    """The usual place of the archive holds that of somebody else, who receives the certificate."""
-    Archive(tmp_path / "archive").prepare()
-    document = checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=0)
-    assert "has no certificate A1/1" in json.dumps(document)
-
-
 # whom the receiver trusts ---------------------------------------------------------------------------------------------
 
 
@@ -491,11 +475,9 @@ def test_an_expired_key_does_not_sign_and_vouches_for_nothing_even_where_it_is_t
 ) -> None:
     old, trust = self_signed("Example Sensor Works", -400, -369), tmp_path / "trust.pem"
     (tmp_path / "old.pem").write_bytes(pem(old))
-    words = ["certificate", "write", made.run.id, "--laboratory", str(made.folder / "laboratory.toml"), "--archive"]
-    words += [str(made.run.archive.root), "--output", str(tmp_path / "out"), "--sign-with", str(tmp_path / "old.pem")]
-    problem = CliRunner().invoke(app, words).exception
-    assert isinstance(problem, WrongUse)
-    assert "nothing was signed: renew it" in str(problem)
+    words = ("certificate", "write", made.run.id, "--laboratory", made.folder / "laboratory.toml", "--archive")
+    words += (made.run.archive.root, "--output", tmp_path / "out", "--sign-with", tmp_path / "old.pem")
+    assert "nothing was signed: renew it" in refused(*words)
     assert not (tmp_path / "out").exists()
     trust.write_bytes(old.certificate.public_bytes(Encoding.PEM))
     (tmp_path / "A1_1.xml.sig").write_bytes(sign_xml((issued.folder / "A1_1.xml").read_bytes(), old))
@@ -510,13 +492,11 @@ def test_an_expired_key_does_not_sign_and_vouches_for_nothing_even_where_it_is_t
 
 def test_wrong_use_is_told(issued: Issued, tmp_path: Path) -> None:
     (tmp_path / "none.pem").write_text("nothing", encoding="utf-8")
-    pdf = str(issued.folder / "A1_1.pdf")
+    pdf = issued.folder / "A1_1.pdf"
     for words, why in (
-        ([pdf, "latest"], "give files or runs, not both"),
-        ([str(tmp_path / "missing.pdf")], "is not there"),
-        ([pdf, "--trust", str(tmp_path / "none.pem")], "holds no certificate that can be read"),
-        (["latest", "--laboratory", str(tmp_path)], "no file of a certificate is given"),
+        ((pdf, "latest"), "give files or runs, not both"),
+        ((tmp_path / "missing.pdf",), "is not there"),
+        ((pdf, "--trust", tmp_path / "none.pem"), "holds no certificate that can be read"),
+        (("latest", "--laboratory", tmp_path), "no file of a certificate is given"),
     ):
-        problem = CliRunner().invoke(app, ["verify", *words]).exception
-        assert isinstance(problem, WrongUse)
-        assert why in str(problem)
+        assert why in refused("verify", *words)
