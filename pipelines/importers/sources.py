@@ -66,8 +66,11 @@ def _after(contents: Sequence[Content], names: list[str], time: str) -> tuple[Co
         tables.append(table)
     whole = all(one.lines for one in contents)
     lines = tuple(part for one in contents for part in one.lines) if whole else ()
+    words = {
+        name: [word for one in contents for word in one.named(name).tolist()] for one in contents for name in one.words
+    }
     table = pd.concat(tables, ignore_index=True)
-    return replace(first, table=table, remarks=tuple(remarks), lines=lines), tuple(breaks[1:])
+    return replace(first, table=table, remarks=tuple(remarks), lines=lines, words=words), tuple(breaks[1:])
 
 
 def _behind(before: pd.DataFrame, table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, bool]:
