@@ -67,6 +67,8 @@ def command(
     units.
     """
     from pipelines.certificates.coefficient_remarks import library_remarks
+    from pipelines.certificates.days import today
+    from pipelines.chain.certifiable import overdue
     from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import all_passed, print_result, summary
     from pipelines.cli.terminal import attended, scanned
@@ -83,6 +85,9 @@ def command(
     asks = not yes if yes is not None else attended() and not as_json
     requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
     jobs = [request.job(Archive(archive)) for request in requests]
+    begins = not Archive(archive).capture(jobs[0].capture_id).is_complete()
+    if begins and (late := overdue(jobs[0].station.model_dump(mode="json"), today())):
+        remark(f"run: no certificate can be issued for this lot: {late}")
     asks = asks and (yes is False or len(requests) > 1 or jobs[0].station.kind == "modbus")
     if record is not None or replay is not None:
         refuse_recorded(jobs, Archive(archive), replays=replay is not None)
@@ -125,6 +130,7 @@ def refuse_recorded(jobs: list[Job], store: Archive, *, replays: bool) -> None:
 
 def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
     """The commands after a run: what its model lacks or its plan cannot show, and its certificates where they can be given."""
+    from pipelines.chain.certifiable import measured_overdue
     from pipelines.cli.next_commands import archive_words, command_line
 
     own = [run.id, *archive_words(archive)]
@@ -133,7 +139,7 @@ def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
     certain = adequate and any(
         unit["outcome"] == "pass" and unit.get("basis") == "budget" for unit in document["units"]
     )
-    return [*lines, command_line("certificate", "issue", *own)] if certain else lines
+    return [*lines, command_line("certificate", "issue", *own)] if certain and not measured_overdue(run) else lines
 
 
 def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -> Run:
