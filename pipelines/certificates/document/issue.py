@@ -149,9 +149,12 @@ def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibrati
     certificates: dict[str, tuple[Calibration, list[Calibration]]] = {}
     for serial, reason in reasons.items():
         known = ledger.calibrations(serial)
-        own = [one for one in known if one.run == run.id and one.state != "revoked"]
+        of_run = [one for one in known if one.run == run.id]
+        own = [one for one in of_run if one.state != "revoked"]
         if own:
             certificates[own[-1].certificate] = own[-1], known
+        elif of_run:
+            done.left_out[serial] = f"{of_run[-1].sentence()}; measure the unit again"
         else:
             done.left_out[serial] = (
                 reason or f"passed and not certified; certify it with 'tumbleline certificate issue {run.id}'"

@@ -54,6 +54,16 @@ def test_a_calibration_holds_from_its_first_day_to_before_its_last_and_is_writte
     assert [again] == ledger.events("A1")
 
 
+def test_the_bare_command_given_again_later_amends_nothing(ledger: Ledger) -> None:
+    later = event(start="2026-03-01", until="2027-03-01")
+    assert ledger.add(later, amend=False) == (ledger.events("A1")[0], True)
+    assert len(ledger.events("A1")) == 1
+    assert not ledger.add(replace(later, covers="sweep", start="2026-03-02"), amend=False)[
+        1
+    ]  # another kind of calibration
+    assert ledger.add(later)[0].action == "supersede"
+
+
 def test_a_new_calibration_ends_the_one_before_where_it_begins_and_names_it_by_its_hash(
     ledger: Ledger, tmp_path: Path
 ) -> None:
@@ -138,6 +148,8 @@ def test_two_kinds_of_device_under_one_serial_are_told(ledger: Ledger) -> None:
     ledger.revoke("A1", "was another unit", certificate=1)
     ledger.add(other)
     assert ledger.valid_at("A1", "2026-12-01").event.device == "ADXL357"
+    later = event(**NEXT | {"device": "imported", "start": "2026-12-02", "run": "r-3"})
+    assert ledger.add(later)[0].action == "supersede"  # an import states no device
 
 
 DAYS = st.integers(0, 40).map(lambda n: (date(2026, 1, 1) + timedelta(days=n)).isoformat())
