@@ -219,7 +219,9 @@ def test_chooses_runs_by_what_they_are(run: Run, monkeypatch: pytest.MonkeyPatch
     new = again(run.archive, run.id, change_from_options(limits="industrial")).new
     archive = run.archive
     assert [e.id for e in selected(archive, ["latest"])] == [new] == [archive.run("latest").id]
-    monkeypatch.setattr("pipelines.rerun.selection.entries", lambda store: entries(store)[::-1])  # its name decides nothing
+    monkeypatch.setattr(
+        "pipelines.rerun.selection.entries", lambda store: entries(store)[::-1]
+    )  # its name decides nothing
     assert [e.id for e in selected(archive, ["latest"])] == [new]
     assert [e.id for e in selected(archive, ["all"])] == [run.id]
     assert [e.id for e in selected(archive, ["device:ADXL355", "unit:A2"])] == [run.id]
