@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from schemas.errors import UNUSABLE
@@ -11,6 +12,7 @@ from schemas.log_lines import tell
 
 def main() -> None:
     """Run the command line."""
+    _open_standard_streams()
     try:
         from pipelines.cli import main as command_line
     except ImportError as problem:
@@ -20,6 +22,18 @@ def main() -> None:
         tell(told, level="error", status=UNUSABLE)
         sys.exit(UNUSABLE)
     command_line()
+
+
+def _open_standard_streams() -> None:
+    """Give a stream that the caller closed to the null device: the next file of the archive would get its descriptor."""
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        if getattr(sys, name) is not None:
+            continue
+        given = os.open(os.devnull, os.O_RDWR)
+        if given != number:
+            os.dup2(given, number)
+            os.close(given)
+        setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115 - open until the end
 
 
 if __name__ == "__main__":

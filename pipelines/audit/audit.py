@@ -110,7 +110,7 @@ def audit(
     """
     index = up_to_date(archive, distribute, workers)
     every_run = dated_runs(index)
-    runs = first_runs(every_run, scope.until)
+    runs = first_runs(index, every_run, scope.until)
     calibrations = load(index, runs)
     later = every_run[every_run["day"] >= scope.tomorrow].sort_values(["day", "run"])
     foreign = tuple(strangers(calibrations, rules))

@@ -16,6 +16,8 @@ from pipelines.audit.parameters import FAMILY_OF, NAMES
 
 DAY_S = 86400.0
 CLOCK_SET_D = 366.0  # a clock that was never set shows 1970
+IMPORTED = "IMPORTED"
+"""Kind of device of units whose measurements came from elsewhere."""
 DATE = "a date such as 2026-05-01T09:30:00Z is needed"
 
 
@@ -80,9 +82,17 @@ def dated_runs(index: AuditIndex) -> pd.DataFrame:
     return runs.assign(day=[_day_or_nan(moment) for moment in runs["measured"]])
 
 
-def first_runs(runs: pd.DataFrame, until: float) -> pd.DataFrame:
-    """Runs that were measured before ``until``, with their day, device and station; each capture once, by its first run."""
-    runs = runs[(runs["rerun_of"] == "") & runs["day"].notna()].sort_values(["day", "run"], kind="stable")
+def first_runs(index: AuditIndex, runs: pd.DataFrame, until: float) -> pd.DataFrame:
+    """Runs that were measured before ``until``, with their day, device and station; each capture once, by its first run.
+
+    An import is measured elsewhere and becomes a calibration by a fit with limits: it counts by the last of these.
+    """
+    graded = set(index.table("units")["run"].to_pylist())
+    imports = runs.loc[(runs["rerun_of"] == "") & (runs["device"] == IMPORTED), "run"]
+    fits = runs[runs["rerun_of"].isin(imports) & runs["run"].isin(graded)].sort_values("started", kind="stable")
+    fits = fits.drop_duplicates("rerun_of", keep="last")
+    runs = runs[(runs["rerun_of"] == "") & ~runs["run"].isin(fits["rerun_of"]) | runs["run"].isin(fits["run"])]
+    runs = runs[runs["day"].notna()].sort_values(["day", "run"], kind="stable")
     capture = runs["capture"].where(runs["capture"] != "", runs["run"])
     return runs.loc[~capture.duplicated() & (runs["day"] < until), ["run", "day", "device", "station"]]
 

@@ -1,16 +1,19 @@
 """Findings about units: exchanged serials, out of tolerance, leaving their limits, drift outliers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from inertial.arrays import Flags
 from inertial.population.comparison import outlier_limit
 from pipelines.audit.audit import Audit
-from pipelines.audit.calibrations import Calibrations, date_of
+from pipelines.audit.calibrations import IMPORTED, Calibrations, date_of
+from pipelines.audit.drifts import OWN
 from pipelines.audit.finding import AuditFinding, date_or_never
-from pipelines.audit.pairs import YEAR_D
-from pipelines.audit.parameters import parameter_text, unit_text
+from pipelines.audit.pairs import YEAR_D, changes_of, last_of_each, pairs_of
+from pipelines.audit.parameters import FAMILY_OF, parameter_text, unit_text
+from pipelines.audit.rules import Rules
 from pipelines.audit.unit_drifts import UnitDrift
 
 
@@ -19,6 +22,10 @@ def of_units(audit: Audit) -> Iterator[AuditFinding]:
     yield from _two_units(audit)
     yield from _exchanged(audit)
     yield from _out_of_tolerance(audit)
+    scope, all_ = audit.scope, audit.all
+    own = audit.good & audit.product & (all_.device == (scope.device.upper() or all_.device))
+    own &= all_.station == (scope.station or all_.station)
+    yield from of_small_kinds(all_, own, audit.rules, {kind.device for kind in audit.kinds}, scope.since)
     yield from _leaving(audit)
     yield from _unlike_their_kind(audit)
 
@@ -75,12 +82,48 @@ def _out_of_tolerance(audit: Audit) -> Iterator[AuditFinding]:
         drift = max(outside, key=lambda d: (abs(d.change) - _expanded(d)) / d.tolerance)
         text = unit_text(drift.parameter)
         message = (
-            f"{drift.unit}: {parameter_text(drift.parameter)} changed by {drift.change:+.4g} {text} in {_after(drift)}, "
+            f"{drift.unit}: {parameter_text(drift.parameter)} changed by {drift.change:+.4g} {text} in {_after(drift.years)}, "
             f"tolerance {drift.tolerance:g} {text}, U {_expanded(drift):.3g}, E_n {drift.e_n:+.1f}{_besides(outside)}; its "
             f"measurements since {date_of(drift.day - YEAR_D * drift.years)} are doubtful: inform its users"
         )
         evidence = {**_numbers(drift), "parameters": [d.parameter for d in outside]}
         yield AuditFinding("quality", "found_outside", drift.unit, message, (drift.unit,), evidence)
+
+
+def of_small_kinds(
+    calibrations: Calibrations, good: Flags, rules: Rules, large: Collection[str], since: float
+) -> Iterator[AuditFinding]:
+    """Units out of tolerance of kinds with too few calibrations for a drift, by U (k = 2) of both calibrations alone.
+
+    large : the kinds with enough of them, whose units :func:`of_units` judges with what their pairs tell of the mounting
+    """
+    pairs = pairs_of(calibrations, good)
+    last = pairs.chosen(last_of_each(calibrations.histories[pairs.later]))
+    changes = {name: changes_of(calibrations, last, name) for name in OWN}
+    for k, row in enumerate(map(int, last.later)):
+        serial, device, day = str(calibrations.unit[row]), str(calibrations.device[row]), float(calibrations.day[row])
+        if device in large or day < since:
+            continue
+        excess = {
+            name: (abs(change[k]) - 2.0 * np.sqrt(variance[k])) / rules.tolerance_of(device, FAMILY_OF[name])
+            for name, (change, variance) in changes.items()
+        }
+        outside = [name for name, over in excess.items() if over > 1.0]
+        if not outside:
+            continue
+        worst = max(outside, key=lambda name: excess[name])
+        change, u = float(changes[worst][0][k]), 2.0 * float(np.sqrt(changes[worst][1][k]))
+        tolerance, text, years = rules.tolerance_of(device, FAMILY_OF[worst]), unit_text(worst), float(last.years[k])
+        message = (
+            f"{serial}: {parameter_text(worst)} changed by {change:+.4g} {text} in {_after(years)}, tolerance {tolerance:g} "
+            f"{text}, U {u:.3g} without the mounting{_besides(outside)}; its measurements since "
+            f"{date_of(day - YEAR_D * years)} are doubtful: inform its users"
+        )
+        evidence = {
+            "parameter": worst, "run": str(calibrations.run[row]), "date": date_of(day), "change": change,
+            "months": 12 * years, "expanded": u, "tolerance": tolerance, "parameters": outside,
+        }  # fmt: skip
+        yield AuditFinding("quality", "found_outside", serial, message, (serial,), evidence)
 
 
 def _leaving(audit: Audit) -> Iterator[AuditFinding]:
@@ -162,9 +205,9 @@ def _numbers(drift: UnitDrift) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _after(drift: UnitDrift) -> str:
+def _after(years: float) -> str:
     """Time between two calibrations, in a unit in which it is not zero."""
-    months, days = 12.0 * drift.years, YEAR_D * drift.years
+    months, days = 12.0 * years, YEAR_D * years
     if months >= 1.5:
         return f"{months:.0f} months"
     return f"{days:.0f} days" if days >= 1.5 else f"{24.0 * days:.2g} hours"
@@ -186,6 +229,7 @@ def twice(calibrations: Calibrations) -> dict[str, tuple[int, int]]:
     same_unit = unit[1:] == unit[:-1]
     close = (np.diff(calibrations.day[order]) < AT_ONCE_D) & (station[1:] != station[:-1])
     by_serial: dict[str, tuple[int, int]] = {}
-    for k in np.flatnonzero(same_unit & ((device[1:] != device[:-1]) | close)):
+    stated = (device[1:] != IMPORTED) & (device[:-1] != IMPORTED)  # an import states no device
+    for k in np.flatnonzero(same_unit & ((device[1:] != device[:-1]) & stated | close)):
         by_serial.setdefault(str(unit[k]), (int(order[k]), int(order[k + 1])))
     return by_serial

@@ -68,19 +68,26 @@ class Ledger:
             raise ArchiveUnusable(f"calibrations: {folder} {problem}")
         return histories.units
 
-    def add(self, event: LedgerEntry, *, supersede: bool = False) -> tuple[LedgerEntry, bool]:
+    def add(self, event: LedgerEntry, *, supersede: bool = False, amend: bool = True) -> tuple[LedgerEntry, bool]:
         """The event that certifies a calibration, and whether it existed before.
 
         Parameters
         ----------
         event : with serial, run, validity and evidence; the ledger adds the other values.
         supersede : also end calibrations that begin later and overlap.
+        amend : whether it takes the place of a certificate of the same run that holds on its first day; else that one stands
         """
         refuse_serial(event.serial, "certify")
+        there: list[LedgerEntry] = []
 
         def decided(events: Sequence[LedgerEntry]) -> LedgerEntry | None:
             known = calibrations_of(events)
-            if any(_same(calibration, event) for calibration in known):
+            there[:] = [
+                calibration.event
+                for calibration in known
+                if _same(calibration, event) or (not amend and _stands_for(calibration, event))
+            ]
+            if there:
                 return None
             refuse_other_device(known, event)
             same_kind = [calibration for calibration in known if event.ends_others_of(calibration.event)]
@@ -88,11 +95,7 @@ class Ledger:
             return replace(event, action="supersede" if ends else "certify", ends=ends)
 
         written = self._append(event.serial, decided)
-        if written is not None:
-            return written, False
-        return next(
-            calibration.event for calibration in self.calibrations(event.serial) if _same(calibration, event)
-        ), True
+        return (there[-1], True) if written is None else (written, False)
 
     def revoke(self, serial: str, reason: str, *, day: str = "", certificate: int = 0) -> LedgerEntry:
         """The event that ends a unit's calibrations.
@@ -215,6 +218,12 @@ def _same(calibration: Calibration, event: LedgerEntry) -> bool:
     """Whether an event would certify a valid calibration again."""
     old = (calibration.run, calibration.event.coefficients, calibration.start, calibration.until)
     return old == (event.run, event.coefficients, event.start, event.until)
+
+
+def _stands_for(calibration: Calibration, event: LedgerEntry) -> bool:
+    """Whether a calibration of the same run, of what the event covers, holds on the first day of the event."""
+    old = (calibration.run, calibration.event.coefficients, calibration.event.covers)
+    return old == (event.run, event.coefficients, event.covers) and calibration.holds(event.start)
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:

@@ -10,6 +10,8 @@ from pipelines.certificates.measured import measured_on
 from pipelines.certificates.validity import Calibration
 from schemas.errors import WrongUse
 
+NOT_STATED = "imported"
+"""Device of the units of an import."""
 SERIAL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
 
 
@@ -64,9 +66,13 @@ def refuse_serial(serial: str, where: str) -> None:
 
 
 def refuse_other_device(known: Sequence[Calibration], event: LedgerEntry) -> None:
-    """Refuse a serial that the ledger knows as another kind of device, unless those calibrations were revoked."""
-    devices = {calibration.event.device for calibration in known if calibration.state != "revoked"} - {event.device}
-    if devices:
+    """Refuse a serial that the ledger knows as another kind of device, unless those calibrations were revoked.
+
+    The device of an import is not stated, and contradicts none.
+    """
+    standing = (calibration.event.device for calibration in known if calibration.state != "revoked")
+    devices = set(standing) - {event.device, NOT_STATED}
+    if devices and event.device != NOT_STATED:
         raise WrongUse(
             f"certify: unit {event.serial} of run {event.run} is a device {event.device}, the ledger knows this serial as "
             f"{', '.join(sorted(devices))}: two units have one serial; find out which is which, and give one another"

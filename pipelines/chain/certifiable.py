@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.probability import passes
@@ -83,17 +83,30 @@ def withdrawn(ledger: Ledger, run: Run, event: LedgerEntry) -> str:
     )
 
 
+def overdue(station: Mapping[str, Any], day: str) -> str:
+    """The first reference standard of a station that was due for calibration by a day, and what to do; empty if none was."""
+    for standard in station.get("reference", []):
+        if str(standard["due"]) <= day:
+            return (
+                f"reference standard {standard['id']} (certificate {standard['certificate']}) was due on {standard['due']}; have "
+                "it calibrated, enter its new certificate in the station's file, and measure again"
+            )
+    return ""
+
+
+def measured_overdue(run: Run) -> str:
+    """What was overdue when a run was measured, as :func:`overdue` says it."""
+    return overdue(run.about.get("station") or {}, _measured(run))
+
+
 def refuse_overdue(run: Run) -> None:
     """Refuse a run whose station had a reference standard that was due before it measured."""
-    about = run.about
-    day = str(about.get("measured") or about["when"])[:10]
-    for standard in (about.get("station") or {}).get("reference", []):
-        if str(standard["due"]) <= day:
-            raise WrongUse(
-                f"certify: run {run.id} was measured on {day}, reference standard {standard['id']} (certificate "
-                f"{standard['certificate']}) was due on {standard['due']}; have it calibrated, enter its new certificate in the "
-                "station's file, and measure again"
-            )
+    if late := measured_overdue(run):
+        raise WrongUse(f"certify: run {run.id} was measured on {_measured(run)}, {late}")
+
+
+def _measured(run: Run) -> str:
+    return str(run.about.get("measured") or run.about["when"])[:10]
 
 
 def refuse_inadequate(run: Run) -> str:

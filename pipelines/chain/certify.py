@@ -95,6 +95,7 @@ def certify(  # noqa: PLR0913 - each is an option of the command
         raise WrongUse(
             f"certify: valid from {first} until {last}, a day after the first is needed; correct --since or --until"
         )
+    meant = bool(start or until or months or reason.strip() or supersede)  # the bare command again is no amendment
     proposals, result = _proposals(run, units, first, last, reason)
     seen = {proposal.serial: len(ledger.events(proposal.serial)) for proposal in proposals}
     refuse_unsound(run, public_keys() if keys is None else keys)
@@ -114,7 +115,7 @@ def certify(  # noqa: PLR0913 - each is an option of the command
             if not supersede:
                 refuse_meanwhile(ledger, proposal, seen[proposal.serial])
         for proposal in proposals:
-            event, was_there = ledger.add(proposal, supersede=supersede)
+            event, was_there = ledger.add(proposal, supersede=supersede, amend=meant)
             (result.there if was_there else result.written).append(event)
         ledger.anchor(result.written)
     return result

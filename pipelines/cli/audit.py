@@ -127,7 +127,9 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], root: str, page: P
 
 def _certificates(audited: Audit) -> str:
     """The state of the ledger in one line."""
+    from inertial.counts import number_of
+
     if not len(audited.certificates):
         return "ledger  nothing is certified: units are due an interval after their last pass"
     valid = f"{int(audited.due.valid.sum())} of {audited.due.row.size} units have one that is valid on {audited.certificates.day}"
-    return f"ledger  {len(audited.certificates)} certificates; {valid}"
+    return f"ledger  {number_of(len(audited.certificates), 'certificate')}; {valid}"

@@ -67,6 +67,8 @@ def command(
     units.
     """
     from pipelines.certificates.coefficient_remarks import library_remarks
+    from pipelines.certificates.days import today
+    from pipelines.chain.certifiable import overdue
     from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import all_passed, print_result, summary
     from pipelines.cli.terminal import attended, scanned
@@ -83,6 +85,9 @@ def command(
     asks = not yes if yes is not None else attended() and not as_json
     requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
     jobs = [request.job(Archive(archive)) for request in requests]
+    begins = not Archive(archive).capture(jobs[0].capture_id).is_complete()
+    if begins and (late := overdue(jobs[0].station.model_dump(mode="json"), today())):
+        remark(f"run: no certificate can be issued for this lot: {late}")
     asks = asks and (yes is False or len(requests) > 1 or jobs[0].station.kind == "modbus")
     if record is not None or replay is not None:
         refuse_recorded(jobs, Archive(archive), replays=replay is not None)

@@ -23,7 +23,7 @@ _SEED = 20
 def populations(archive: Archive, device: str, workers: int = 1) -> list[PopulationRow]:
     """Coefficients whose units are two populations, and pairs that correlate: each unit once, by its first calibration."""
     index = up_to_date(archive, workers=workers)
-    runs = first_runs(dated_runs(index), np.inf)
+    runs = first_runs(index, dated_runs(index), np.inf)
     calibrations = load(index, runs)
     of_kind = calibrations.chosen(calibrations.device.astype(str) == device)
     order = np.argsort(of_kind.day, kind="stable")

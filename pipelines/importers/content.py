@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import pandas as pd
 
@@ -24,6 +25,7 @@ class Content:
     units : column → unit, as the file states it
     interval_s : sample interval that the file states, s; None if it states none
     lines : of a text, each file's name and the line of each of its rows, from 0, file after file; empty if unknown
+    words : of a text, columns as they were written, where numbers do not tell it: serial numbers such as 007, 1e5, NA
     """
 
     table: pd.DataFrame
@@ -31,6 +33,11 @@ class Content:
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     interval_s: float | None = None
     lines: tuple[tuple[str, Sequence[int]], ...] = ()
+    words: Mapping[str, Sequence[Any]] = field(default_factory=dict[str, Sequence[Any]])
+
+    def named(self, column: str) -> pd.Series:
+        """A column that holds names, as it was written."""
+        return pd.Series(self.words[column], name=column) if column in self.words else self.table[column]
 
     def row(self, index: int) -> str:
         """A row (from 0) for messages: its number among the rows of data from 1, and its line in an editor where it is known."""

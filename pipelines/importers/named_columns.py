@@ -26,9 +26,14 @@ _SERIAL = re.compile(r"^(?:unit|serial|sn|s/n|dut|device)(?:[ _.-]?(?:no|nr|numb
 _NUMBER = re.compile(r"^(?:dwell|pos|position|no|nr|number|index|step)(?:[ _.-]?(?:no|nr|number))?\.?$", re.IGNORECASE)
 
 
+def is_of_serials(name: str) -> bool:
+    """Whether a column is called like one of serial numbers."""
+    return _SERIAL.match(name) is not None
+
+
 def serials(table: pd.DataFrame) -> str:
     """The column of serial numbers; empty if there is none. Units of measurement are none, nor are numbers of the rows."""
-    for name in (str(column) for column in table.columns if _SERIAL.match(str(column))):
+    for name in (str(column) for column in table.columns if is_of_serials(str(column))):
         distinct = table[name].unique()
         few = len(distinct) == 1 or 2 * len(distinct) <= len(table)
         if few and table[name].notna().all() and not all(output_unit(str(value)) for value in distinct):

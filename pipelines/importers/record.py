@@ -61,7 +61,7 @@ def imported(
         an axis is constant, words are torn, or a dwell holds several positions.
     """
     content = content or Content(table)
-    columns = _columns(table, mapping, where)
+    columns = _columns(content, mapping, where)
     rows, columns, dropped = _with_numbers(columns, mapping, where, content)
     left_out_before = {int(k) + 1 for k in np.flatnonzero(np.diff(rows) > 1)}
     breaks = sorted({int(np.searchsorted(rows, k)) for k in breaks} | left_out_before)
@@ -110,8 +110,8 @@ def imported(
     return Imported(samples, dwells, out_unit, remarks, tuple(faults.rows(time)))
 
 
-def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.Series]:
-    names = list(table.columns)
+def _columns(content: Content, mapping: Mapping, where: str) -> dict[str, pd.Series]:
+    names = list(content.table.columns)
     columns: dict[str, pd.Series] = {}
     for meaning, source_column in mapping.columns.items():
         column = column_name(names, source_column)
@@ -119,7 +119,7 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
             raise DataRejected(
                 f"{where}: column '{shown(source_column)}' (for {meaning}) is not there; {did_you_mean(source_column, names)}"
             )
-        columns[meaning] = table[column]
+        columns[meaning] = content.named(column) if meaning == "unit" else content.table[column]
     meanings = [meaning for meaning in ("time", *AXES) if meaning in columns]
     mapped = [str(columns[meaning].name) for meaning in meanings]
     if len(set(mapped)) < len(mapped):

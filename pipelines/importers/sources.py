@@ -66,8 +66,13 @@ def _after(contents: Sequence[Content], names: list[str], time: str) -> tuple[Co
         tables.append(table)
     numbered = all(content.lines for content in contents)
     lines = tuple(part for content in contents for part in content.lines) if numbered else ()
+    words = {
+        name: [word for each in contents for word in each.named(name).tolist()]
+        for content in contents
+        for name in content.words
+    }
     table = pd.concat(tables, ignore_index=True)
-    return replace(first, table=table, remarks=tuple(remarks), lines=lines), tuple(breaks[1:])
+    return replace(first, table=table, remarks=tuple(remarks), lines=lines, words=words), tuple(breaks[1:])
 
 
 def _behind(before: pd.DataFrame, table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, bool]:

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, unit_in
+from pipelines.importers.named_columns import is_of_serials
 from pipelines.importers.text_layout import Layout, fields_of, filled_lines, is_comment, is_number, layout
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
@@ -26,6 +27,8 @@ _BLOCK = 100_000
 _FEW_BYTES, _MOSTLY = 16, 0.9
 _MOST_LINES = 10
 """Line breaks of a quoted field, at most: beyond them the quote is a sign such as that of inches."""
+_PLAIN = re.compile(r"-?(?:0|[1-9]\d{0,14})(?:\.0*)?")
+"""A whole number that reads back as it was written."""
 _FORTRAN = re.compile(r"^\s*[+-]?\d*\.?\d+[dD][+-]?\d+\s*$")
 
 _SURE = ("'", "\N{RIGHT SINGLE QUOTATION MARK}", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", "\N{THIN SPACE}")
@@ -95,7 +98,10 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     # a line break inside a quoted field, or lines that the parser joins, moves all rows behind it
     line_by_line = len(lines) == len(text.splitlines()) and len(rows) == len(table)
     interval, stated_by = _stated_interval(lines[: detected.first])
-    return Content(table, (*remarks, *stated_by), units, interval, ((where, rows),) if line_by_line else ())
+    words = _words(body, detected, table)
+    for name in filter(is_of_serials, words):
+        table[name] = words[name]
+    return Content(table, (*remarks, *stated_by), units, interval, ((where, rows),) if line_by_line else (), words)
 
 
 def _stated_interval(lines: Sequence[str]) -> tuple[float | None, tuple[str, ...]]:
@@ -177,6 +183,33 @@ def _read(body: Sequence[str], detected: Layout, names: list[str]) -> pd.DataFra
             if all(len(kinds) == 1 or kinds <= {"i", "u", "f"} for kinds in kinds_of_columns):
                 return pd.concat(parts, ignore_index=True)
     return parsed(body)
+
+
+def _words(body: Sequence[str], detected: Layout, table: pd.DataFrame) -> dict[str, list[str]]:
+    """Columns that may hold names, as they were written, where the parser took names for numbers, flags or gaps: 007, 1e5, NA."""
+    may = [k for k in range(len(table.columns)) if _may_name(table.iloc[:, k])]
+    if not may:
+        return {}
+    written = pd.read_csv(
+        io.StringIO("\n".join(body)), sep=detected.divider, header=None, usecols=may, dtype=str, keep_default_na=False,
+        skipinitialspace=True, names=[*table.columns, *(["\0last"] if detected.trailing else [])], index_col=False,
+    )  # fmt: skip
+    columns = {str(table.columns[k]): written.iloc[:, place].str.strip() for place, k in enumerate(may)}
+    return {
+        name: column.tolist()
+        for name, column in columns.items()
+        if not all(_PLAIN.fullmatch(word) for word in column.unique().tolist())
+    }
+
+
+def _may_name(column: pd.Series) -> bool:
+    """Whether the values of a column repeat as serial numbers do, and are whole numbers, flags, or partly gaps."""
+    distinct = column.unique()
+    if len(distinct) > 1 and 2 * len(distinct) > len(column):
+        return False
+    if column.dtype.kind == "f":
+        return bool(np.all(~np.isfinite(distinct) | (distinct == np.rint(distinct))))
+    return column.dtype.kind in "iub" or bool(column.isna().any())
 
 
 def _fortran(table: pd.DataFrame) -> pd.DataFrame:

@@ -172,9 +172,11 @@ def _chosen(a: Run, b: Run) -> list[dict[str, Any]]:
         rows.append(_row("model", "", _model_text(*models), _model_text(*reversed(models))))
     if limits[0] != limits[1]:
         first, second = (limit or {} for limit in limits)
-        rows.append(
-            _row("limits", _limits_text(first, second), *(limit.get("name", "none") for limit in (first, second)))
-        )
+        decided = [key for key in ("rule", "coverage_factor", "grade") if first.get(key) != second.get(key)]
+        named = _changed_figures(first, second)
+        if named or not decided:
+            rows.append(_row("limits", named, *(limit.get("name", "none") for limit in (first, second))))
+        rows += [_row("limits", key, *(limit.get(key, "none") for limit in (first, second))) for key in decided]
     return rows
 
 
@@ -192,12 +194,10 @@ def _model_text(model: dict[str, Any], other: dict[str, Any]) -> str:
     return ", ".join(model["effects"]) or "none"
 
 
-def _limits_text(before: dict[str, Any], after: dict[str, Any]) -> str:
-    """The keys of the limits that differ."""
+def _changed_figures(before: dict[str, Any], after: dict[str, Any]) -> str:
+    """The figures whose limits differ."""
     a, b = before.get("figures", {}), after.get("figures", {})
-    names = [name for name in {**a, **b} if a.get(name) != b.get(name)]
-    names += [key for key in ("rule", "coverage_factor", "grade") if before.get(key) != after.get(key)]
-    return ", ".join(names)
+    return ", ".join(name for name in {**a, **b} if a.get(name) != b.get(name))
 
 
 def _manifests(a: Run, b: Run) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:

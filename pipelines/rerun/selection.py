@@ -110,7 +110,8 @@ def _named(known: list[SelectedRun], names: list[str], archive: Archive) -> list
     ids = [entry.id for entry in known]
     chosen: set[str] = set()
     for name in names:
-        here = [ids[-1]] if name == LATEST else [i for i in ids if i == name] or [i for i in ids if i.startswith(name)]
+        name = archive.run(name).id if name == LATEST else name  # noqa: PLW2901 - by its start, as every command means it
+        here = [i for i in ids if i == name] or [i for i in ids if i.startswith(name)]
         if not here:
             raise WrongUse(f"archive {archive.root}: no run is called '{name}'; {did_you_mean(name, ids)}")
         chosen.update(here)

@@ -243,6 +243,9 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
     text_of("show", fitted["run"], "--report", status=0)
     (certified,) = document_of("certificate", "issue", fitted["run"])["certified"]
     assert (certified["certificate"], certified["station"]) == ("H1/1", "lab-2")
+    audited = text_of("audit")
+    assert "1 calibration, 1 unit, 1 run, 1 station" in audited
+    assert "ledger 1 certificate; 1 of 1 units" in audited
     page = Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")
     for words in ("H1/1", "Uncertainty budget", "G-2025-7", "dwells were held out of the fit", "of the worst axis"):
         assert words in page
@@ -252,6 +255,7 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
     assert "local gravity" in Path("H1_1.xml").read_text(encoding="utf-8")
     text_of("verify", status=0)
     text_of("certificate", "revoke", "H1", "--reason", "fell to the floor", status=0)
+    assert "H1/1 REVOKED (fell to the floor); measure the unit again" in refused("certificate", "write", fitted["run"])
     page = Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")  # made again, as that of a captured run
     assert '<span class="tag fail">revoked</span>' in page
     assert "fell to the floor" in page

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -173,7 +174,9 @@ def test_two_units_with_one_serial_on_two_stations_at_once_are_refused(tmp_path:
     assert len(Ledger(store).events("A1")) == 1
 
 
-def test_what_was_measured_with_an_overdue_standard_is_not_certified(tmp_path: Path) -> None:
+def test_what_was_measured_with_an_overdue_standard_is_not_certified(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     due = (datetime.now(UTC) - timedelta(days=1)).date()
     station = tmp_path / "bench.toml"
     own = (ROOT / "stations" / "simulated.toml").read_text(encoding="utf-8")
@@ -181,8 +184,15 @@ def test_what_was_measured_with_an_overdue_standard_is_not_certified(tmp_path: P
     job = Request(recipe=recipe_file(tmp_path), station=station).job()
     runner = Runner(job, Archive(tmp_path / "archive"), measure=CaptureDouble())
     list(runner.all())
-    with pytest.raises(WrongUse, match=rf"reference standard L-7 \(certificate C 12\) was due on {due}"):
+    late = rf"reference standard L-7 \(certificate C 12\) was due on {due}"
+    with pytest.raises(WrongUse, match=late):
         certify(Ledger(runner.run.archive), runner.run)
+    monkeypatch.setattr("pipelines.cli.run.measured", lambda *_, **__: runner.run)
+    words = ("run", recipe_file(tmp_path), "--station", station, "--direct", "--archive")
+    for archive, warned in (("new", True), ("archive", False)):  # where it is measured already nothing more is lost
+        _, out, told = given(*words, tmp_path / archive)
+        assert bool(re.search(late, told)) == warned
+        assert "certificate issue" not in out
 
 
 def test_a_run_json_that_was_lost_hides_no_other_run_and_a_run_that_was_cut_off_tells_how_to_go_on(root: Path) -> None:

@@ -149,9 +149,12 @@ def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibrati
     certificates: dict[str, tuple[Calibration, list[Calibration]]] = {}
     for serial, reason in reasons.items():
         known = ledger.calibrations(serial)
-        of_run = [calibration for calibration in known if calibration.run == run.id and calibration.state != "revoked"]
-        if of_run:
-            certificates[of_run[-1].certificate] = of_run[-1], known
+        of_run = [calibration for calibration in known if calibration.run == run.id]
+        standing = [calibration for calibration in of_run if calibration.state != "revoked"]
+        if standing:
+            certificates[standing[-1].certificate] = standing[-1], known
+        elif of_run:
+            done.left_out[serial] = f"{of_run[-1].sentence()}; measure the unit again"
         else:
             done.left_out[serial] = (
                 reason or f"passed and not certified; certify it with 'tumbleline certificate issue {run.id}'"

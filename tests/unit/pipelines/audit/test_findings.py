@@ -16,13 +16,13 @@ from benchmarks.generated_archive import write_archive
 from benchmarks.generated_ledger import write_ledger
 from pipelines.archive import Archive
 from pipelines.audit.audit import Scope, audit
-from pipelines.audit.calibrations import Calibrations, date_of, day_of
+from pipelines.audit.calibrations import IMPORTED, Calibrations, date_of, day_of
 from pipelines.audit.due import due, last_measured
 from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.findings import findings
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.rules import load_rules
-from pipelines.audit.unit_findings import twice
+from pipelines.audit.unit_findings import of_small_kinds, twice
 
 RULES = load_rules()
 
@@ -44,6 +44,7 @@ def calibrations(*rows: tuple[str, str, str, float], values: np.ndarray | None =
 def test_one_serial_on_two_kinds_or_stations_within_minutes_is_two_units_and_on_the_next_day_one() -> None:
     kinds = calibrations(("A", "ADXL355", "s", 0.0), ("A", "SF1500", "s", 90.0), ("B", "ADXL355", "s", 0.0))
     assert list(twice(kinds)) == ["A"]
+    assert twice(calibrations(("A", "ADXL355", "s", 0.0), ("A", IMPORTED, "s", 90.0))) == {}  # which states no device
     at_once = calibrations(("A", "X", "s", 10.0), ("A", "X", "t", 10.002), ("B", "X", "s", 10.0), ("B", "X", "t", 11.0))
     assert list(twice(at_once)) == ["A"]
     again = calibrations(("A", "X", "s", 10.0), ("A", "X", "s", 10.002))  # the same station began once more
@@ -61,6 +62,20 @@ def test_exchanged_serials_are_told_among_four_units_and_no_change_of_a_unit_is(
     values[1] += 9000.0
     values[5] -= 9000.0
     assert strangers(calibrations(*rows, values=values), RULES) == []
+
+
+def test_of_few_units_those_that_left_their_tolerance_are_found_by_their_uncertainty(rng: np.random.Generator) -> None:
+    rows = [(unit, "ADXL355", "s", day) for unit in "ABCD" for day in (0.0, 180.0)]
+    values = np.repeat(5000.0 * rng.standard_normal((4, len(NAMES))), 2, axis=0)
+    bias, scale = NAMES.index("bias_x"), NAMES.index("scale_z")
+    values[1, bias] += 1600.0  # A: tolerance 1500 µg
+    values[3, bias] += 1400.0
+    values[5, scale] -= 1020.0  # C: tolerance 1000 ppm, but U is 40 ppm
+    moved = calibrations(*rows, values=values)
+    errors = np.where(np.arange(len(NAMES)) == scale, 14.2, moved.errors)
+    found = of_small_kinds(replace(moved, errors=errors), np.ones(8, dtype=bool), RULES, (), 0.0)
+    assert [(one.kind, one.units, one.evidence["parameter"]) for one in found] == [("found_outside", ("A",), "bias_x")]
+    assert list(of_small_kinds(moved, np.ones(8, dtype=bool), RULES, {"ADXL355"}, 0.0)) == []
 
 
 def test_units_are_due_from_their_last_calibration_and_at_the_station_that_made_it() -> None:

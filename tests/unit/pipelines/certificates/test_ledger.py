@@ -123,6 +123,8 @@ def test_two_kinds_of_device_under_one_serial_are_told(ledger: Ledger) -> None:
     ledger.revoke("A1", "was another unit", certificate=1)
     ledger.add(other)
     assert ledger.valid_at("A1", "2026-12-01").event.device == "ADXL357"
+    later = event(**NEXT | {"device": "imported", "start": "2026-12-02", "run": "r-3"})
+    assert ledger.add(later)[0].action == "supersede"  # an import states no device
 
 
 DAYS = st.integers(0, 40).map(lambda n: (date(2026, 1, 1) + timedelta(days=n)).isoformat())
@@ -182,3 +184,12 @@ def test_units_that_passed_are_certified_and_show_tells_the_calibration_of_a_dat
     last = document_of("show", "A2", "--at", day(100), *own, status=1)["history"][-1]
     assert (last["state"], last["ended"]["reason"]) == ("revoked", "returned damaged")
     assert "unit 'B7' has no calibration in archive" in refused("show", "B7", "--at", "2026-01-01", *own)
+
+
+def test_the_bare_command_given_again_later_amends_nothing(ledger: Ledger) -> None:
+    later = event(start="2026-03-01", until="2027-03-01")
+    assert ledger.add(later, amend=False) == (ledger.events("A1")[0], True)
+    assert len(ledger.events("A1")) == 1
+    _, was_there = ledger.add(replace(later, covers="sweep", start="2026-03-02"), amend=False)
+    assert not was_there  # another kind of calibration
+    assert ledger.add(later)[0].action == "supersede"

@@ -197,3 +197,14 @@ def test_a_demonstration_keeps_the_model_of_the_one_before(tmp_path: Path) -> No
     assert aside == tmp_path / "model-1.toml"
     assert aside.read_text("utf-8") == "mine"
     assert demo._put_aside(tmp_path / "model.toml") is None
+
+
+def test_a_closed_stream_is_no_defect_and_no_verdict() -> None:
+    for closed, words, status in (
+        (">&-", "plan keys names --json", 0),
+        ("<&- >&- 2>&-", "list --archive none", UNUSABLE),
+    ):
+        told = subprocess.run(
+            ["sh", "-c", f'exec "$0" -m pipelines {words} {closed}', sys.executable], capture_output=True, check=False
+        )
+        assert (told.returncode, told.stderr) == (status, b"")

@@ -9,7 +9,7 @@ import recordings
 from each import each
 
 from inertial.errors import NotIdentified
-from pipelines.importers import files
+from pipelines.importers import files, sources
 from pipelines.importers.clocks import stamps
 from pipelines.importers.content import Content
 from pipelines.importers.inspection import inspect
@@ -240,3 +240,26 @@ def test_a_sensor_that_was_not_turned_is_told_so_and_what_to_do(rng: np.random.G
     with pytest.raises(NotIdentified, match=r"was not turned.*--set face=FACE"):
         refuse_one_pose(still)
     refuse_one_pose(np.concatenate([still, -still]))
+
+
+SERIALS = ("007", "7", "1e5", "100000", "NaN", "NA", "TRUE", "0x1F", "12345678901234567890")
+
+
+@each(["unit", "Part"])
+def test_serial_numbers_stay_as_they_were_written(column: str, tmp_path: Path) -> None:
+    for names in (*[(one,) for one in SERIALS], SERIALS):
+        rows = [f"{name};{k};{k},5;{0.1 * k:.1f};0.2;9.8".replace(".", ",") for name in names for k in range(4)]
+        (tmp_path / "a.csv").write_text("\n".join([f"{column};no;t;x;y;z", *rows]) + "\n")
+        found = files.read_content(tmp_path / "a.csv")[0]
+        mapping = build({
+            "columns": {"unit": column, "dwell": "no", "time": "t", "x": "x", "y": "y", "z": "z"},
+            "units": {"output": "m/s^2", "time": "s"}, "rows": "dwells",
+        }, "a.csv")  # fmt: skip
+        assert set(imported(found.table, mapping, "a.csv", content=found).units) == set(names)
+
+
+def test_serial_numbers_of_several_files_stay_as_they_were_written(tmp_path: Path) -> None:
+    for name, serial in (("a.csv", "007"), ("b.csv", "12")):
+        (tmp_path / name).write_text(f"part,t,x\n{serial},0,0.1\n{serial},1,0.2\n")
+    joined, _, _ = sources.read([tmp_path / "a.csv", tmp_path / "b.csv"], join="rows", time="t")
+    assert list(map(str, joined.named("part"))) == ["007", "007", "12", "12"]

@@ -45,8 +45,10 @@ def test_other_limits_flip_grades_and_no_coefficient_and_are_named(run: Run, tmp
     assert document["coefficients"] == []
     assert document["flipped"] == [worst]
     assert document["units"][0]["unit"] == worst
-    assert whats(document) == [("limits", "")]
+    assert whats(document) == [("limits", ""), ("limits", "")]
     assert "zero_g_offset_mg" in document["because"][0]["name"]
+    rule = document["because"][1]
+    assert [rule[key] for key in ("name", "a", "b")] == ["rule", run.about["limits"]["rule"], "simple_acceptance"]
 
 
 def test_another_model_is_named_and_changes_stand_against_both_uncertainties(run: Run, larger: Run) -> None:

@@ -21,7 +21,7 @@ from pipelines.rerun import steps
 from pipelines.rerun.partition import Batch, run_again
 from pipelines.rerun.reproduce import LEFT_OUT, SAME, check
 from pipelines.rerun.rerun import RerunOutcome, again
-from pipelines.rerun.selection import selected
+from pipelines.rerun.selection import entries, selected
 from schemas.errors import DataRejected, WrongUse
 
 LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
@@ -205,9 +205,14 @@ def test_a_check_writes_nothing_and_names_the_table_and_the_size_of_what_differs
     assert "by at most 0.5" in comparison.differences[0]
 
 
-def test_chooses_runs_by_what_they_are(run: Run) -> None:
-    again(run.archive, run.id, change_from_options(limits="industrial"))
+def test_chooses_runs_by_what_they_are(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    new = again(run.archive, run.id, change_from_options(limits="industrial")).new
     archive = run.archive
+    assert [e.id for e in selected(archive, ["latest"])] == [new] == [archive.run("latest").id]
+    monkeypatch.setattr(
+        "pipelines.rerun.selection.entries", lambda store: entries(store)[::-1]
+    )  # its name decides nothing
+    assert [e.id for e in selected(archive, ["latest"])] == [new]
     assert [e.id for e in selected(archive, ["all"])] == [run.id]
     assert [e.id for e in selected(archive, ["device:ADXL355", "unit:A2"])] == [run.id]
     assert [e.id for e in selected(archive, ["since:2020-01-01", "until:2999-12-31"])] == [run.id]
