@@ -9,7 +9,7 @@ from inertial.arrays import Flags
 from inertial.population.comparison import outlier_limit
 from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import IMPORTED, Calibrations, date_of
-from pipelines.audit.drifts import OWN
+from pipelines.audit.drifts import OF_UNIT
 from pipelines.audit.finding import AuditFinding, date_or_never
 from pipelines.audit.pairs import YEAR_D, changes_of, last_of_each, pairs_of
 from pipelines.audit.parameters import FAMILY_OF, parameter_text, unit_text
@@ -99,7 +99,7 @@ def of_small_kinds(
     """
     pairs = pairs_of(calibrations, good)
     last = pairs.chosen(last_of_each(calibrations.histories[pairs.later]))
-    changes = {name: changes_of(calibrations, last, name) for name in OWN}
+    changes = {name: changes_of(calibrations, last, name) for name in OF_UNIT}
     for k, row in enumerate(map(int, last.later)):
         serial, device, day = str(calibrations.unit[row]), str(calibrations.device[row]), float(calibrations.day[row])
         if device in large or day < since:
