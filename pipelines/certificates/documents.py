@@ -114,6 +114,14 @@ class ShowValidityDocument(TypedDict):
     history: Annotated[list[CalibrationDocument], "every calibration of the unit, oldest first"]
 
 
+class CertificateListDocument(TypedDict):
+    """``certificate list --json``: the certificates of an archive, by unit."""
+
+    archive: str
+    at: Annotated[str | None, "the day on which those that are listed are valid; null: all are listed"]
+    certificates: Annotated[list[CalibrationDocument], "by serial, then oldest first"]
+
+
 class CertificateFiles(TypedDict):
     """The files of one certificate."""
 

@@ -81,6 +81,16 @@ class Calibration:
         """Whether it is valid on a day."""
         return self.start <= day < self.until
 
+    def state_on(self, day: str) -> str:
+        """Its state on a day, in words: ``valid``, ``begins later``, ``expired``, or how it ended before its time."""
+        if self.holds(day):
+            return "valid"
+        if self.state == "revoked":
+            return f"revoked: {self.reason}"
+        if day < self.start:
+            return "begins later"
+        return "expired" if self.state == "valid" else f"superseded {self.reason}"
+
     def key_values(self) -> list[str]:
         """The entry of exports and reports: certificate, first day, the day after the last, state, reason of its end."""
         return [self.certificate, self.start, self.until, self.state, self.reason]

@@ -1,13 +1,14 @@
-"""``tumbleline certificate``: the certificates of units: issued for a period, written as documents, revoked."""
+"""``tumbleline certificate``: the certificates of units: issued for a period, listed, written as documents, revoked."""
 
 from pipelines.cli.certificate_issue import issue
+from pipelines.cli.certificate_list import list_certificates
 from pipelines.cli.certificate_revoke import revoke
 from pipelines.cli.certificate_write import write
 from pipelines.cli.groups import group
 
 PART = "Certificates, trace, audit"
 ORDER = 410
-SUMMARY = "Issue certificates for a period of validity, write them as documents, revoke them."
+SUMMARY = "Issue certificates for a period of validity, list them, write them as documents, revoke them."
 EXAMPLES = (
     "tumbleline certificate issue latest --until 12m",
     "tumbleline certificate write latest --laboratory laboratory.toml --output certificates",
@@ -18,6 +19,7 @@ EXAMPLES_OF = {
         "tumbleline certificate write latest --laboratory laboratory.toml --output certificates",
         "tumbleline certificate write SN1 --laboratory laboratory.toml --output certificates --sign-with key.pem",
     ),
+    "list": ("tumbleline certificate list", "tumbleline certificate list --at 2026-06-30 --json"),
     "revoke": (
         "tumbleline certificate revoke SN1 --reason 'fell to the floor'",
         "tumbleline certificate revoke SN1 2 --reason 'reference out of date'",
@@ -25,4 +27,4 @@ EXAMPLES_OF = {
 }
 """Of the subcommands."""
 
-app = group(SUMMARY, {"issue": issue, "write": write, "revoke": revoke})
+app = group(SUMMARY, {"issue": issue, "list": list_certificates, "write": write, "revoke": revoke})

@@ -53,6 +53,7 @@ OPTIONS: dict[str, dict[str, str]] = {
     "audit": _PAGE,
     "certificate issue": {**_SINCE, "--months": "--until {}m", "--key": "--trust"},
     "certificate write": {"--password-file": "+--sign-with ,{}"},
+    "certificate list": {},
     "certificate revoke": {**_SINCE, "--certificate": "{}"},
     "compare": _MODEL,
     "correct": {

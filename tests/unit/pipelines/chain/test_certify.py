@@ -145,6 +145,28 @@ def test_a_re_run_of_measurements_whose_certificate_was_revoked_is_certified_onl
     assert compose(rerun, known[-1], known, NOBODY).amendment.replaces == ("A1/1",)
 
 
+def test_certificates_are_listed_with_their_state_on_a_day(run: Run, typed: Typed) -> None:
+    typed("certificate", "issue", run.id)
+    typed("certificate", "revoke", "A2", "--reason", "cracked glass")
+    listed = json.loads(typed("certificate", "list", "--json").stdout)["certificates"]
+    assert [(each["certificate"], each["state"]) for each in listed] == [
+        ("A1/1", "valid"), ("A2/1", "revoked"), ("A3/1", "valid"),
+    ]  # fmt: skip
+    assert {"A2/1", "revoked:", "cracked"} <= set(typed("certificate", "list", "A2").stdout.split())
+    holding = json.loads(typed("certificate", "list", "--at", day(), "--json").stdout)
+    assert [each["serial"] for each in holding["certificates"]] == ["A1", "A3"]
+    assert "no certificate valid on 2001-01-01" in typed("certificate", "list", "--at", "2001-01-01").stdout
+    first = Ledger(run.archive).calibrations("A1")[0]
+    assert [first.state_on(at) for at in ("2001-01-01", first.start, first.until)] == [
+        "begins later",
+        "valid",
+        "expired",
+    ]
+    refused = typed("certificate", "list", "A9")
+    assert isinstance(refused.exception, WrongUse)
+    assert "unit 'A9' has no certificate; did you mean" in str(refused.exception)
+
+
 def test_a_certificate_is_offered_where_it_would_be_given(
     run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
