@@ -164,7 +164,7 @@ def test_certificates_are_listed_with_their_state_on_a_day(run: Run, typed: Type
     ]
     refused = typed("certificate", "list", "A9")
     assert isinstance(refused.exception, WrongUse)
-    assert "unit 'A9' has no certificate; did you mean" in str(refused.exception)
+    assert "unit 'A9' has no certificate; known: A1, A2, A3" in str(refused.exception)
 
 
 def test_a_certificate_is_offered_where_it_would_be_given(
