@@ -126,6 +126,7 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("fresh", "DWELLS2"): _data,
     ("units", "SN"): _units,
     ("serial", "SERIAL"): _units,
+    ("serials", "SERIAL"): _units,
     ("effect", "NAME|random"): lambda ctx: ["random", *(scene.kind for scene in _scenes(ctx))],
     ("effect", "EFFECT"): _effects,
     ("effects", ""): _effects,

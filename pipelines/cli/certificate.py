@@ -8,7 +8,7 @@ from pipelines.cli.groups import group
 
 PART = "Certificates, trace, audit"
 ORDER = 410
-SUMMARY = "Issue certificates for a period of validity, list them, write them as documents, revoke them."
+SUMMARY = "Issue certificates for a period, list them, write them as documents, revoke them."
 EXAMPLES = (
     "tumbleline certificate issue latest --until 12m",
     "tumbleline certificate write latest --laboratory laboratory.toml --output certificates",

@@ -59,6 +59,7 @@ CASES = {
         "release", "{folder}/model.toml", "--since", "2026-01-01", "--force", "--reason", "a test",
     ],
     "release --json": ["release"],
+    "certificate list --json": ["certificate", "list"],
     "certificate revoke UNIT --json": ["certificate", "revoke", "A1", "--reason", "a test"],
     "lineage UNIT|RUN|FILE --json": ["lineage", "A1"],
     "import FILE… --json": ["import", "{folder}/rest.csv", *IMPORTED],

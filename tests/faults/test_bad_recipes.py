@@ -27,7 +27,7 @@ RECIPE = ROOT / "schemas" / "samples" / "production.toml"
         ("rate_hz = 100.0", "rate_hz = 1e200", "'rate_hz': found 1e\\+200"),
         ("rate_hz = 100.0", "rate_hz = 1e6", "static_record_s: 1.2e\\+09 samples in one record"),
         ("static_record_s = 1200.0", "static_record_s = 1e18", "'static_record_s': found"),
-        ("[-10.0, 25.0, 60.0]", "[-400.0, 25.0]", "'temperatures_C.0': found -400"),
+        ("[-10.0, 25.0, 60.0]", "[-400.0, 25.0]", "'temperatures_C', number 1: found -400"),
         ("seed = 1", "seed = -1", "'seed': found -1"),
         ("seed = 1", f"seed = {'9' * 5000}", "not valid TOML"),
         ("seed = 1", f"seed = 0x{'f' * 6000}", "'seed': found a int too large to show"),

@@ -143,7 +143,7 @@ def test_ctrl_c_in_a_capture_says_that_it_goes_on_and_it_does(tmp_path: Path) ->
 
 
 def said(error: dict[str, float], group: dict, *units: str) -> str:
-    document = {"adequate": False, "blocked_by": [], "unexplained": None}
+    document = {"adequate": False, "blocked_by": [], "unexplained": None, "leave_out": None, "reason": None}
     return verdict({**document, "error": error, "units": [*units], "classes": [group]})
 
 
