@@ -12,7 +12,7 @@ from pydantic_core import PydanticUndefined
 from schemas.limits import Limits
 from schemas.line import Line
 from schemas.recipe import RecipeFile
-from schemas.stated import STATED
+from schemas.stated import STATED, SYMBOLS
 from schemas.station import StationConfig
 from schemas.toml_files import models_in
 
@@ -28,10 +28,6 @@ BESIDE = {"u": "", "U": "; its factor is 'k'", "half_width": "; its shape is 'di
 """What a form of uncertainty refers to in the same table."""
 PARTS = {"inl": "integral nonlinearity"}
 """Parts of an entry whose name in a key is no word."""
-UNITS = {
-    "urad": "µrad", "arcsec": "″", "deg": "°", "ppm": "ppm", "percent": "%", "ug": "µg", "K": "K", "s": "s", "g": "g",
-    "m_s2": "m/s²",
-}  # fmt: skip
 TABLES: dict[Any, str] = {list: "list of tables", dict: "tables by name"}
 SHAPES: dict[Any, str] = {list: "list", tuple: "list", dict: "table"}
 PLAIN = {float: "number", int: "integer", str: "text", bool: "true or false"}
@@ -75,10 +71,10 @@ def meaning(model: type[BaseModel], name: str) -> str:
             if name in texts.get(section, {}):
                 return texts[section][name]
     match = STATED.match(name)
-    if match is None or match["unit"] not in UNITS:
+    if match is None or match["unit"] not in SYMBOLS:
         return ""
     part = f" of the {PARTS.get(match['part'], match['part'])}" if match["part"] else ""
-    return f"{FORMS[match['form']]}{part}, {UNITS[match['unit']]}{BESIDE[match['form']]}."
+    return f"{FORMS[match['form']]}{part}, {SYMBOLS[match['unit']]}{BESIDE[match['form']]}."
 
 
 @cache

@@ -3,13 +3,20 @@
 from datetime import date as Day  # noqa: N812 - a field has its name
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from schemas.bounds import Number, Positive, Text
+from schemas.stated import SYMBOLS
 from schemas.strict import Grown
 from schemas.uncertainty import TO_SI
 
-Unit = Literal["urad", "arcsec", "deg", "ppm", "percent", "ug", "K", "s", "g", "m_s2"]
+_OF_SYMBOL = {symbol.replace("µ", micro): unit for unit, symbol in SYMBOLS.items() for micro in "µμ"}
+
+Unit = Annotated[
+    Literal["urad", "arcsec", "deg", "ppm", "percent", "ug", "K", "s", "g", "m_s2"],
+    BeforeValidator(lambda unit: _OF_SYMBOL.get(unit, unit) if isinstance(unit, str) else unit),
+]
+"""Also by its symbol, as a certificate has it: µrad, ″, °, %, µg, m/s²."""
 
 
 class Reference(Grown):

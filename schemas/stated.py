@@ -17,6 +17,11 @@ TO_SI = {
     "s": 1.0, "g": 1.0, "m_s2": 1.0,
 }  # fmt: skip
 """Factors to rad, 1, g, K and s."""
+SYMBOLS = {
+    "urad": "µrad", "arcsec": "″", "deg": "°", "ppm": "ppm", "percent": "%", "ug": "µg", "K": "K", "s": "s", "g": "g",
+    "m_s2": "m/s²",
+}  # fmt: skip
+"""Of the units in names of keys."""
 SHARED_SCOPES = ("station", "run", "slot", "mount")
 STATED = re.compile(r"^(?:(?P<part>[a-z]+)_)?(?P<form>u|U|half_width)_(?P<unit>[A-Za-z0-9_]+)$")
 

@@ -15,6 +15,7 @@ from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.prior import prior_document, prior_sentence
 from schemas.reference import Reference
+from schemas.stated import SYMBOLS
 from schemas.uncertainty import Uncertainty
 
 SOURCES = {
@@ -38,11 +39,12 @@ def source_words(text: str) -> str:
 def standard_of(reference: Reference) -> content.ReferenceStandard:
     """A standard of the station as a certificate names it."""
     accreditation = f" ({reference.accreditation})" if reference.accreditation else ""
+    unit = SYMBOLS.get(reference.unit or "", "")
     return content.ReferenceStandard(
         laboratory=reference.laboratory + accreditation,
         date="" if reference.date is None else reference.date.isoformat(),
         due=reference.due.isoformat(),
-        uncertainty="" if reference.U is None else f"U = {reference.U:g} {reference.unit or ''} (k = {reference.k:g})",
+        uncertainty="" if reference.U is None else f"U = {reference.U:g} {unit} (k = {reference.k:g})",
         **{name: getattr(reference, name) for name in ("id", "what", "certificate", "sha256")},
     )
 

@@ -11,6 +11,7 @@ from pipelines.report.templates import fill
 from pipelines.stages.figures import figure_label
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
+from schemas.stated import SYMBOLS
 from schemas.uncertainty import NEEDED
 
 ORDER = 45
@@ -62,7 +63,10 @@ def render(report: ReportContext) -> str:
         source=str(entries.get("grade_source", "assumed")).replace("_", " "),
         plot=still(shares_plot(_shares(report.tables["budget"], first))) if len(sums) else "",
         missing=missing if len(sums) else {},
-        references=[{**NO_REFERENCE, **reference} for reference in station.get("reference", [])],
+        references=[
+            {**NO_REFERENCE, **reference, "unit": SYMBOLS.get(reference.get("unit") or "", "")}
+            for reference in station.get("reference", [])
+        ],
         seen=_seen(sums),
         risks=_risks(report.tables.get("lot_risks")),
     )

@@ -19,10 +19,11 @@ from capture_double import small_run
 from in_process import document_of, refused
 from in_process import text_of as printed
 from laboratory import LABORATORY, laboratory_file
+from pydantic import ValidationError
 
 from pipelines.archive import Archive, Run
 from pipelines.certificates import Ledger
-from pipelines.certificates.document.circumstances import traceability
+from pipelines.certificates.document.circumstances import standard_of, traceability
 from pipelines.certificates.document.compose import compose
 from pipelines.certificates.document.content import CertificateContent, Coefficient, ReferenceStandard
 from pipelines.certificates.document.dcc import DCC, SI, dcc, validate
@@ -341,6 +342,21 @@ def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
     assert "of the standards listed: gravity." in text
     assert text.endswith("by the sources in the budgets (certificates): seat.")
     assert "not claimed" in traceability(StatedBudget(**own, references=(), grade_source="data_sheet"), entries)
+
+
+def test_the_unit_of_a_standard_is_read_by_symbol_or_name_and_printed_as_a_symbol() -> None:
+    for written, symbol in (
+        ("µrad", "µrad"),
+        ("\u03bcrad", "µrad"),
+        ("urad", "µrad"),
+        ("″", "″"),
+        ("m/s²", "m/s²"),
+        ("K", "K"),
+    ):
+        standard = Reference(id="G-1", certificate="C-1", due=date(2027, 1, 1), U=25.0, k=2.0, unit=written)
+        assert standard_of(standard).uncertainty == f"U = 25 {symbol} (k = 2)"
+    with pytest.raises(ValidationError):
+        Reference(id="G-1", certificate="C-1", due=date(2027, 1, 1), U=25.0, k=2.0, unit="furlong")
 
 
 def test_the_certificate_states_the_verdict_with_p_what_u_does_not_contain_and_no_probability_of_0(
