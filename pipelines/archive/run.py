@@ -44,8 +44,12 @@ def lost_files(folder: Place, names: set[str]) -> list[str]:
     if SEALED not in names:
         return []
     named = {name.rpartition("/")[2] for name in files.read_json(folder / SEALED)["files"] if name.startswith("runs/")}
-    tables = {f"{name.removesuffix('.json')}.parquet" for name in named - {START, "report.json"}}
-    return sorted((named | tables) - names)
+    alone = [
+        name for name in (named & names) - {START, "report.json"} if name.replace(".json", ".parquet") not in names
+    ]
+    # a manifest states the stage that made its table; the document of an inquiry has no table
+    tables = {name.replace(".json", ".parquet") for name in alone if "stage" in files.read_json(folder / name)}
+    return sorted((named - names) | tables)
 
 
 class Rooted(Protocol):

@@ -179,7 +179,7 @@ def test_a_flow_waits_for_approval_and_goes_on_when_it_is_given(tmp_path: Path) 
         end, waiting = time.monotonic() + 150.0, []
         while not waiting and time.monotonic() < end and process.poll() is None:
             done = asked()
-            waiting = typed_document("station", "operator", done.stdout)["waiting"] if done.returncode == 0 else []
+            waiting = typed_document("station", done.stdout)["waiting"] if done.returncode == 0 else []
         assert "approve: measure " in waiting[0]["question"]
         assert "third_order" in waiting[0]["question"]
         for _ in range(6):
@@ -242,7 +242,7 @@ def test_the_loop_closes_on_a_recorded_covariate(humid: Path) -> None:
     assert compared["rms_ug"] < 0.2 * told(humid, "compare", first.id)["rms_ug"]
     renewed = told(humid, "rerun", first.id, "--model", model)
     assert left_ug(humid, renewed["runs"][0]["new"]) < 0.2 * left_ug(humid, first.id)
-    verdict = told(humid, "whatif", model, first.id)
+    verdict = told(humid, "release", "whatif", model, first.id)
     before, after = verdict["total"]["fit_rms_ug"]
     assert after < 0.2 * before
     assert verdict["verdict"] == "no better"

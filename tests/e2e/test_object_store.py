@@ -69,9 +69,9 @@ def test_the_commands_work_on_an_address(address: str, local: Run) -> None:
     assert {unit["outcome"] for unit in shown["units"]} == {"pass"}
     assert shown["report"].startswith("s3://factory/main/runs/small-")
     assert ask(address, "show", local.id, "grades")["rows"]
-    ask(address, "certify", local.id)
+    ask(address, "certificate", "issue", local.id)
     assert ask(address, "show", "A2")["calibration"]["certificate"] == "A2/1"
-    ask(address, "revoke", "A2", "--reason", "lost")
+    ask(address, "certificate", "revoke", "A2", "--reason", "lost")
     assert [e.action for e in Ledger(Archive(address)).events("A2")] == ["certify", "revoke"]
     assert {one.serial for one in Ledger(Archive(address)).all()} == {"A1", "A2", "A3"}
     before, linear = len(Archive(address).runs()), "bias,scale,bias_temperature,misalignment,scale_temperature"
