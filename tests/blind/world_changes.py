@@ -183,8 +183,8 @@ def walk_is_known(document: dict, _: MadeLot) -> bool:
 
 
 def small_and_seen(document: dict, _: MadeLot) -> bool:
-    # a fifth of the noise of a dwell about the record's mean, most of which is walk: 20 of 116 µg, p below 1e-10
-    return document["classes"][0]["size_ug"] < 0.2 * document["error"]["floor_ug"]
+    # a third of the noise of a dwell, most of which is walk: 20 of 67 µg, p below 1e-10
+    return document["classes"][0]["size_ug"] < 0.35 * document["error"]["floor_ug"]
 
 
 def carried_by_the_dwell(document: dict, _: MadeLot) -> bool:

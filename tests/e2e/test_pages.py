@@ -166,7 +166,7 @@ def test_the_plan_of_the_page_that_tells_rivals_apart_finds_what_it_says(home: P
     found = min(row["chi_square"] for row in document["rivals"])
     assert found >= 50.0
     assert max(row["textbook"] for row in document["rivals"]) < 1e-3
-    match = re.search(r"(\d+) dwells of 2 s at 25 °C, in (\d+) % of its time, give χ² (\d+)", PLAN_PAGE)
+    match = re.search(r"(\d+) dwells of 2 s at 25 °C in (\d+) % of its time, gives χ² (\d+)", PLAN_PAGE)
     assert match is not None
     assert document["dwells"] == pytest.approx(int(match[1]), abs=4)
     assert 100.0 * document["share"] == pytest.approx(int(match[2]), abs=1.0)
