@@ -41,7 +41,7 @@ layers: $(VENV)/.dev
 pytest: $(VENV)/.dev $(CRATE)/.done debian
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS) --dist worksteal $(TESTS)
 
-test-slow: $(VENV)/.dev $(CRATE)/.done debian  ## suites that take minutes, about four hours in all on two cores that do other work beside
+test-slow: $(VENV)/.dev $(CRATE)/.done debian  ## suites that take minutes, an hour or two in all on two cores
 	$(BIN)/python -m pytest -m slow -n $(shell nproc) --dist worksteal $(TESTS)
 
 test-pythons:  ## set up, main job and tests in a fresh clone, for each Python that is found; or PYTHONS="python3.12 …", TESTS=tests/unit
