@@ -23,9 +23,9 @@ def of_units(audit: Audit) -> Iterator[AuditFinding]:
     yield from _exchanged(audit)
     yield from _out_of_tolerance(audit)
     scope, all_ = audit.scope, audit.all
-    own = audit.good & audit.product & (all_.device == (scope.device.upper() or all_.device))
-    own &= all_.station == (scope.station or all_.station)
-    yield from of_small_kinds(all_, own, audit.rules, {kind.device for kind in audit.kinds}, scope.since)
+    judged = audit.good & audit.product & (all_.device == (scope.device.upper() or all_.device))
+    judged &= all_.station == (scope.station or all_.station)
+    yield from of_small_kinds(all_, judged, audit.rules, {kind.device for kind in audit.kinds}, scope.since)
     yield from _leaving(audit)
     yield from _unlike_their_kind(audit)
 

@@ -194,7 +194,7 @@ def _words(body: Sequence[str], detected: Layout, table: pd.DataFrame) -> dict[s
         io.StringIO("\n".join(body)), sep=detected.divider, header=None, usecols=may, dtype=str, keep_default_na=False,
         skipinitialspace=True, names=[*table.columns, *(["\0last"] if detected.trailing else [])], index_col=False,
     )  # fmt: skip
-    columns = {str(table.columns[k]): written.iloc[:, place].str.strip() for place, k in enumerate(may)}
+    columns = {str(table.columns[k]): written.iloc[:, index].str.strip() for index, k in enumerate(may)}
     return {
         name: column.tolist()
         for name, column in columns.items()
