@@ -78,7 +78,8 @@ def flat_top(record: Array, rate_hz: float, duration_s: float, noise: float, bas
     first, last = span(y, int(np.argmax(y)), height - band)
     count = last - first + 1
     usual = rate_hz * duration_s * 2.0 / np.pi * float(np.arccos(1.0 - band / height))
-    if count < max(LONGER * usual, FEWEST_FLAT):
+    # by the phase of the samples and their noise, one more at each end stands so
+    if count < max(LONGER * (usual + 2.0), FEWEST_FLAT):
         return 0
     away = max(round(BESIDE * count), 2)
     sides = y[max(first - away, 0)], y[min(last + away, y.size - 1)]

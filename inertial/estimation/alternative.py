@@ -78,7 +78,9 @@ class Handling(Effect):
 
     def short(self, size: Array, **location: float) -> str:
         """A short text for a location of :meth:`instead`; to be written where that gives any."""
-        raise NotImplementedError(f"{self.id}: a short text is missing beside the locations of 'instead'")
+        raise NotImplementedError(
+            f"{self.id}: 'instead' gives other locations, but 'short' has no text for them; write it"
+        )
 
     def possible(self, size: Array) -> bool:
         """Whether the alternative can have coefficients (k,); beyond them another cause has its shape."""

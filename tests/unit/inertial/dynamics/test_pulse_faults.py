@@ -48,3 +48,13 @@ def test_a_rebound_is_found_and_a_ringing_is_none(block: int) -> None:
         )
     assert sum(false) == 0
     assert np.mean(missed) < 0.1
+
+
+def test_a_half_sine_of_few_samples_at_its_top_is_not_cut_off(rng: np.random.Generator) -> None:
+    """3 to 10 kHz, 11 ms, noise of 0.01 to 0.5 % of the peak, any phase of the samples."""
+    for rate, noise in ((3000, 1e-3), (4000, 1e-3), (4000, 2e-3), (5000, 3e-4), (10_000, 5e-3)):
+        for _ in range(60):
+            time = (np.arange(rate // 20) + rng.random()) / rate - 0.0165
+            wave = np.where((time > 0.0) & (time < 0.011), np.sin(np.pi * time / 0.011), 0.0)
+            record = 30.0 * (wave + noise * rng.standard_normal(time.size))
+            assert flat_top(record, rate, 0.011, 30.0 * noise, 0.0) == 0
