@@ -150,9 +150,12 @@ def test_15_kb_of_gzip_with_millions_of_cells_are_refused_before_they_are_a_tabl
 def test_a_killed_reader_leaves_no_copy_of_a_recording(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("TMPDIR", str(tmp_path / "copies"))
     (tmp_path / "copies").mkdir()
-    limited.end()
-    with pytest.raises(DataRejected, match="not read after 3 s"):
-        in_tests(copies_to, str(tmp_path), limits=ReadingLimits(256 * MIB, 5, 3))
+    for seconds in (3, 20):  # on a busy machine three seconds end before the reader has its libraries
+        limited.end()
+        with pytest.raises(DataRejected, match=f"not read after {seconds} s"):
+            in_tests(copies_to, str(tmp_path), limits=ReadingLimits(256 * MIB, 5, seconds))
+        if (tmp_path / "began").is_file():
+            break
     assert (tmp_path / "began").read_text(encoding="utf-8").endswith(" 1000")
     assert list((tmp_path / "copies").iterdir()) == []
 
