@@ -341,6 +341,8 @@ TABLES: dict[str, Table] = {
             "named": FLAG,
             "units": WHOLE,
         },
+        # variances of the noise over the white one, where all units and axes have the same: what follows needs no search
+        measured=("flicker_share", "walk_share"),
         key=("model",),
     ),
     # risks of the decisions over the production that a lot stands for

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from inertial.arrays import Array
 from inertial.discovery.scores import LotScores, scores_of
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
-from pipelines.stages.judge import verdict_of
+from pipelines.stages.judge import shares_of, verdict_of
 from pipelines.tables.sound_lot import every_unit_faulty, sound_lot
 from schemas.errors import ArchiveUnusable, DataRejected, RecipeInvalid
 
@@ -83,7 +84,8 @@ def _scored(run: Run) -> ScoredRun:
         "who": str(about.get("who", "")),
     }
     try:
-        reason = _reason(run, effects)
+        verdict = run.table("verdict") if (run.path / "verdict.parquet").is_file() else None
+        reason = _reason(run, effects, verdict)
         if reason:
             return ScoredRun(**head, left_out=reason)
         has_history = (run.path / "history.parquet").is_file()
@@ -98,21 +100,21 @@ def _scored(run: Run) -> ScoredRun:
             return ScoredRun(**head, left_out="its devices have fewer than three axes")
         faulty = {fault.unit for fault in faults}
         units = tuple(unit for row, unit in enumerate(measurement.units) if row not in faulty)
-        return _scored_lot(head, units, slots, scores_of(lot, effects))
+        shares = None if verdict is None else shares_of(verdict)
+        return _scored_lot(head, units, slots, scores_of(lot, effects, shares=shares))
     except (InertialError, DataRejected, RecipeInvalid) as problem:
         return ScoredRun(**head, left_out=str(problem).rstrip("."))
 
 
-def _reason(run: Run, effects: Sequence[str]) -> str:
+def _reason(run: Run, effects: Sequence[str], verdict: pd.DataFrame | None) -> str:
     """Why a run is not scored; empty where it is."""
     if not effects:
         return "it has no model"
     if not (run.path / "dwells.parquet").is_file():
         return "it has no dwells"
-    if (run.path / "verdict.parquet").is_file():
-        verdict = verdict_of(run.table("verdict"))
-        if verdict is not None and verdict["adequate"] is False:
-            return "its model is not adequate; see 'tumbleline diagnose'"
+    judged = None if verdict is None else verdict_of(verdict)
+    if judged is not None and judged["adequate"] is False:
+        return "its model is not adequate; see 'tumbleline diagnose'"
     return ""
 
 

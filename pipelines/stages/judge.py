@@ -10,6 +10,7 @@ from typing_extensions import TypedDict
 
 from inertial import effects as catalogue
 from inertial.errors import InertialError
+from inertial.estimation.noise_shares import Shares
 from pipelines.tables.frames import empty_table, rows_of
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, sound_lot, told
 from schemas.errors import DataRejected, RecipeInvalid
@@ -36,13 +37,31 @@ class AdequacyDocument(TypedDict):
 
 def judge(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
     """The table ``verdict`` of a run; without rows where it has no model, as without a multi-position test."""
-    return {"verdict": verdict_table(verdict_on(dwells, history, effects) if effects else None, effects)}
+    if not effects:
+        return {"verdict": verdict_table(None, effects)}
+    verdict, shares = _judged(dwells, history, effects)
+    table = verdict_table(verdict, effects)
+    return {"verdict": table if shares is None else table.assign(flicker_share=shares.flicker, walk_share=shares.walk)}
 
 
 def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> AdequacyDocument:
     """The verdict of a diagnosis on a model, without classes and proposals; the reason where data or an effect are not usable."""
+    return _judged(dwells, history, effects)[0]
+
+
+def shares_of(table: pd.DataFrame) -> Shares | None:
+    """The shares of the noise that a table ``verdict`` holds; None where the model was not adequate or dwells were left out."""
+    if table.empty or "flicker_share" not in table:
+        return None
+    return Shares(float(table["flicker_share"].iloc[0]), float(table["walk_share"].iloc[0]))
+
+
+def _judged(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]
+) -> tuple[AdequacyDocument, Shares | None]:
+    """The verdict, and the shares of the noise of an adequate model; None if dwells were left out or blocks have their own."""
     if dwells.empty:
-        return _not_judged("every unit was refused, so that no dwell is left; see the reasons of each unit")
+        return _not_judged("every unit was refused, so that no dwell is left; see the reasons of each unit"), None
     from inertial.criticism.verdict import judged  # loads the search for effects: a run without dwells does not need it
 
     try:
@@ -50,15 +69,18 @@ def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequ
         measurement, faults, lot = sound_lot(dwells, history, effects)
         faulty = sorted({measurement.units[fault.unit] for fault in faults})
         if lot is None:
-            return _not_judged(every_unit_faulty(faults), faulty)
+            return _not_judged(every_unit_faulty(faults), faulty), None
         with threadpool_limits(1):
             verdict = judged(lot, effects, generator())
         error = error_of(verdict.rms, verdict.floor, verdict.log_p)
         adequate, reason, error = told(verdict.base, verdict.adequate, verdict.unjudged, error)
     except (DataRejected, RecipeInvalid, InertialError) as problem:
-        return _not_judged(str(problem).rstrip("."))
+        return _not_judged(str(problem).rstrip(".")), None
     units = len(measurement.units) - len(faulty)
-    return _document(adequate, reason or None, error, verdict.found, units, faulty)
+    shares = verdict.base.noise.shares
+    if not adequate or verdict.handled or verdict.removed or shares.by_block:
+        shares = None
+    return _document(adequate, reason or None, error, verdict.found, units, faulty), shares
 
 
 def told_by(diagnosis: Mapping[str, Any], units: int) -> AdequacyDocument:

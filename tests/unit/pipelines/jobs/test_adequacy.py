@@ -13,6 +13,7 @@ from in_process import document_of
 from long_suites import mostly_slow
 from lots import lot
 
+from inertial.discovery.scores import scores_of
 from inertial.uncertainty.rounding import chance
 from pipelines.archive import Archive, Run
 from pipelines.cli.text.verdict_text import print_adequacy
@@ -24,7 +25,8 @@ from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
 from pipelines.report.panels import model_adequacy
 from pipelines.rerun.rerun import again
-from pipelines.stages.judge import judge, told_by, verdict_of, verdict_on
+from pipelines.stages.judge import judge, shares_of, told_by, verdict_of, verdict_on
+from pipelines.tables.sound_lot import sound_lot
 
 MODEL = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 FIGURES = ("rms_ug", "floor_ug", "p_value")
@@ -84,8 +86,15 @@ def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:
     assert {name: short[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}
     assert short["faulty"] == sorted({unit for fault in whole["blocked_by"] for unit in fault["units"]})
     assert (short["reason"] is None) == (adequate is not None)
-    stored = verdict_of(judge(table, None, effects)["verdict"])  # it comes back from its table
-    assert stored == told_by(whole, table["unit"].nunique())
+    judged = judge(table, None, effects)["verdict"]
+    assert verdict_of(judged) == told_by(whole, table["unit"].nunique())  # it comes back from its table
+    shares = shares_of(judged)
+    assert (shares is not None) == bool(adequate)
+    if adequate:
+        lot = sound_lot(table, None, effects)[2]
+        by_search, by_verdict = scores_of(lot, effects), scores_of(lot, effects, shares=shares)
+        np.testing.assert_allclose(by_verdict.score, by_search.score, rtol=1e-9)
+        np.testing.assert_allclose(by_verdict.lot, by_search.lot, rtol=1e-9)
 
 
 @pytest.fixture(scope="module")
