@@ -78,6 +78,7 @@ class Ledger:
         amend : whether it takes the place of a certificate of the same run that holds on its first day; else that one stands
         """
         refuse_serial(event.serial, "certify")
+        event = replace(event, reason=event.reason.strip())
         there: list[LedgerEntry] = []
 
         def decided(events: Sequence[LedgerEntry]) -> LedgerEntry | None:
@@ -215,9 +216,10 @@ def _stamped(event: LedgerEntry, known: Sequence[tuple[LedgerEntry, str]]) -> Le
 
 
 def _same(calibration: Calibration, event: LedgerEntry) -> bool:
-    """Whether an event would certify a valid calibration again."""
+    """Whether an event would certify a valid calibration again, and states no other reason, which would amend it."""
     old = (calibration.run, calibration.event.coefficients, calibration.start, calibration.until)
-    return old == (event.run, event.coefficients, event.start, event.until)
+    repeated = old == (event.run, event.coefficients, event.start, event.until)
+    return repeated and event.reason in {"", calibration.event.reason}
 
 
 def _stands_for(calibration: Calibration, event: LedgerEntry) -> bool:

@@ -186,10 +186,15 @@ def test_units_that_passed_are_certified_and_show_tells_the_calibration_of_a_dat
     assert "unit 'B7' has no calibration in archive" in refused("show", "B7", "--at", "2026-01-01", *own)
 
 
-def test_the_bare_command_given_again_later_amends_nothing(ledger: Ledger) -> None:
+def test_the_bare_command_given_again_amends_nothing_and_a_reason_of_the_same_day_does(ledger: Ledger) -> None:
     later = event(start="2026-03-01", until="2027-03-01")
     assert ledger.add(later, amend=False) == (ledger.events("A1")[0], True)
     assert len(ledger.events("A1")) == 1
     _, was_there = ledger.add(replace(later, covers="sweep", start="2026-03-02"), amend=False)
     assert not was_there  # another kind of calibration
+    amended, _ = ledger.add(event(reason="the grade was misread"))
+    assert ledger.add(event(reason="the grade was misread ")) == (amended, True)
+    assert ledger.add(event()) == (amended, True)
+    assert (amended.action, amended.ends, amended.reason) == ("supersede", (1,), "the grade was misread")
+    assert ledger.valid_at("A1", "2026-01-01").event == amended
     assert ledger.add(later)[0].action == "supersede"
