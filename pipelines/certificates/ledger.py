@@ -17,6 +17,7 @@ from pipelines.archive.provenance import provenance
 from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.days import LAST, today
 from pipelines.certificates.entries import LedgerEntry, event_of, folder_of, numbered_files
+from pipelines.certificates.measured import same_measurement
 from pipelines.certificates.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
 from pipelines.certificates.validity import Calibration, calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
@@ -226,6 +227,17 @@ def _stands_for(calibration: Calibration, event: LedgerEntry) -> bool:
     """Whether a calibration of the same run, of what the event covers, holds on the first day of the event."""
     old = (calibration.run, calibration.event.coefficients, calibration.event.covers)
     return old == (event.run, event.coefficients, event.covers) and calibration.holds(event.start)
+
+
+def left_valid(archive: Archive, serial: str, ended: Sequence[int]) -> list[str]:
+    """Numbers of the unit's certificates that hold today or later, of the measurements of others that were ended."""
+    known = {calibration.event.sequence: calibration for calibration in Ledger(archive).calibrations(serial)}
+    runs = [Run(archive, run) for run in dict.fromkeys(known[number].run for number in ended)]
+    return [
+        calibration.certificate
+        for calibration in known.values()
+        if calibration.until > max(calibration.start, today()) and any(same_measurement(run, calibration.run) for run in runs)
+    ]
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
