@@ -236,7 +236,8 @@ def left_valid(archive: Archive, serial: str, ended: Sequence[int]) -> list[str]
     return [
         calibration.certificate
         for calibration in known.values()
-        if calibration.until > max(calibration.start, today()) and any(same_measurement(run, calibration.run) for run in runs)
+        if calibration.until > max(calibration.start, today())
+        and any(same_measurement(run, calibration.run) for run in runs)
     ]
 
 

@@ -85,6 +85,7 @@ def command(
         list[str] | None, option("--unit-of output=LSB,time=s,temperature=degC", "Units of measure of the columns.")
     ] = None,
     units: Annotated[str, option("--units SN", "Serial number, if no column has it.")] = "",
+    device: Annotated[str, option("--device PRESET|NAME", "Kind of device; audit and discover compare its like.")] = "",
     rate: Annotated[float | None, option("--rate HZ", "Rate of samples without a time.")] = None,
     setting: Annotated[
         list[str] | None,
@@ -132,9 +133,9 @@ def command(
         raise WrongUse(f"import: --set {other[0]} is for records at rest, --procedure is given; leave it out")
     if procedure and waveforms:
         layout = (listed, stated_units, rate, given.get("group", ""))
-        _waveforms(files, procedure, file, units, layout, archive, as_json=as_json)
+        _waveforms(files, procedure, file, units, layout, archive, device, as_json=as_json)
     if procedure:
-        _transfer(files, units, effects, (listed, stated_units, file), archive, as_json=as_json)
+        _transfer(files, units, effects, (listed, stated_units, file), archive, device, as_json=as_json)
     from pipelines.diagnosis.import_document import import_document
 
     keys: dict[str, Any] = mapped.from_file(file) if file else {}
@@ -142,6 +143,7 @@ def command(
         "columns": mapped.pairs(listed, "--map"),
         "units": mapped.pairs(stated_units, "--unit-of"),
         "unit": units,
+        "device": device,
         "rate_hz": rate,
         **given,
     }
@@ -180,6 +182,7 @@ def _transfer(
     effects: str,
     stated: tuple[str, str, Path | None],
     archive: str | None,
+    device: str,
     *,
     as_json: bool,
 ) -> NoReturn:
@@ -187,6 +190,7 @@ def _transfer(
 
     stated : columns and units as the options have them, and the file of --set
     """
+    from pipelines.importers.keep import stated_device
     from pipelines.importers.transfer import import_transfer
     from pipelines.importers.transfer_columns import stated_layout
 
@@ -194,7 +198,10 @@ def _transfer(
         raise WrongUse("import: no serial number, a transfer function needs one; add --units SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
     layout = stated_layout(*stated)
-    imported = [import_transfer(path, unit, model, archive, layout) for path in files]
+    device, slip = stated_device(device)
+    imported = [import_transfer(path, unit, model, archive, layout, device) for path in files]
+    for transfer in imported:
+        transfer["text"] += slip
     document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
     passed = all(transfer["adequate"] is True for transfer in imported)
     conclude(document, lambda _: _print_transfers(imported), as_json=as_json, passed=passed)
@@ -207,6 +214,7 @@ def _waveforms(
     unit: str,
     stated: tuple[str, str, float | None, str],
     archive: str | None,
+    device: str,
     *,
     as_json: bool,
 ) -> NoReturn:
@@ -216,6 +224,7 @@ def _waveforms(
 
     stated : columns and units as the options have them, rate in Hz, group
     """
+    from pipelines.importers.keep import stated_device
     from pipelines.importers.mapping import pairs
     from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 
@@ -223,22 +232,33 @@ def _waveforms(
         raise WrongUse("import: no serial number, the recordings of a test need one; add --units SN")
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
-    imported = import_waveforms(paths, procedure, part, unit, layout, archive)
+    device, slip = stated_device(device)
+    imported = import_waveforms(paths, procedure, part, unit, layout, archive, device)
+    imported["text"] += slip
     held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
     passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
     conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
 
 
+def _named(units: Sequence[str], device: str | None) -> str:
+    """The units of an import with their kind of device, where it is stated."""
+    return ", ".join(units) + (f" ({device})" if device else "")
+
+
 def _print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
     for transfer in imports:
-        say(f"{transfer['unit']}: {transfer['points']} points, kept as run {transfer['run']}")
+        say(
+            f"{_named([transfer['unit']], transfer['device'])}: {transfer['points']} points, kept as run {transfer['run']}"
+        )
         for line in transfer["text"]:
             say(f"  {line}")
         print_verdict_of_fit(transfer["adequate"], "the model does not describe these points")
 
 
 def _print_waveforms(imported: Mapping[str, Any]) -> None:
-    say(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
+    say(
+        f"{_named([imported['unit']], imported['device'])}: {imported['records']} recordings, kept as run {imported['run']}"
+    )
     rows = [
         [
             figure["figure"],
@@ -264,7 +284,7 @@ def _print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: ob
         dwells = number_of(imported["dwells"], "dwell")
         rows = f"{number_of(imported['samples'], 'sample')}, {dwells}" if imported["samples"] else dwells
         unit = imported["out_unit"] or "a unit that is not known (--unit-of output=… states it)"
-        say(f"{', '.join(imported['units'])}: {rows} in {unit}, kept as run {imported['run']}")
+        say(f"{_named(imported['units'], imported['device'])}: {rows} in {unit}, kept as run {imported['run']}")
         for remark in [*imported["remarks"], *imported["lines"]]:
             say(f"  {remark}")
         if list_dwells:

@@ -39,6 +39,8 @@ def import_document(
     from pipelines.importers.pose_check import CHECK_AXIS
 
     name = " + ".join(path.name for path in paths)
+    device, slip = keep.stated_device(str(keys.get("device", "")))
+    keys = {**keys, "device": device} if device else keys
     columns, units = keys.get("columns"), keys.get("units")
     if isinstance(columns, dict) and isinstance(units, dict) and "output" in units:
         mapped.build(keys, where)  # an error of the mapping is reported before a file is read
@@ -48,7 +50,7 @@ def import_document(
             paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
         )
         if "columns" not in keys and is_exchange(content.table.columns):
-            return _table_of_dwells(content.table, keys, paths[0], source, fit, archive)
+            return _table_of_dwells(content.table, keys, paths[0], source, fit, archive, slip)
         how = _mapping(keys, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
     judged = None
@@ -67,10 +69,11 @@ def import_document(
         "run": run.id,
         "source": source.as_dict(),
         "units": data.units,
+        "device": device or None,
         "out_unit": data.out_unit,
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
-        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips],
+        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips, *slip],
         "faults": list(data.faults),
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,
@@ -81,32 +84,39 @@ def import_document(
 
 
 def _table_of_dwells(
-    table: pd.DataFrame, keys: dict[str, Any], path: Path, source: SourceFile, fit: str, archive: str | None
+    table: pd.DataFrame,
+    keys: dict[str, Any],
+    path: Path,
+    source: SourceFile,
+    fit: str,
+    archive: str | None,
+    slip: tuple[str, ...],
 ) -> dict[str, Any]:
     """A table of dwells in the exchange format, which states by its columns what a mapping would."""
     from pipelines.diagnosis.inputs import file_beside
     from pipelines.importers.exchange import checked, read_history
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
-    if fit or set(keys) - {"units"}:
-        more = [*sorted(set(keys) - {"units"}), *(["fit"] if fit else [])]
+    if fit or set(keys) - {"units", "device"}:
+        more = [*sorted(set(keys) - {"units", "device"}), *(["fit"] if fit else [])]
         raise WrongUse(
-            f"import: {path.name} is a table of dwells in the exchange format, which takes --unit-of output=… alone (found "
-            f"{', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
+            f"import: {path.name} is a table of dwells in the exchange format, which takes --unit-of output=… and --device alone "
+            f"(found {', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
         )
-    beside = file_beside(str(path), "history")
+    beside, device = file_beside(str(path), "history"), str(keys.get("device", ""))
     dwells, remarks = complete_table(
         checked(table, where=path.name, foreign=True), keys.get("units", {}).get("output", "")
     )
-    run = keep_table_of_dwells(dwells, read_history(beside) if beside else None, path.name, archive, source)
+    run = keep_table_of_dwells(dwells, read_history(beside) if beside else None, path.name, archive, source, device)
     return {
         "run": run.id,
         "source": source.as_dict(),
         "units": list(dict.fromkeys(dwells["unit"].astype(str))),
+        "device": device or None,
         "out_unit": str(dwells["out_unit"].iloc[0]) if "out_unit" in dwells.columns else "",
         "samples": 0,
         "dwells": len(dwells),
-        "remarks": [*remarks, *([f"temperatures between the dwells: {Path(beside).name}"] if beside else [])],
+        "remarks": [*remarks, *slip, *([f"temperatures between the dwells: {Path(beside).name}"] if beside else [])],
         "faults": [],
         "fit": None,
         "adequate": None,

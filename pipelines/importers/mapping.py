@@ -87,6 +87,8 @@ class Mapping(BaseModel):
     units: Units
     unit: str = ""
     """Serial number, if the file has no column for it."""
+    device: str = ""
+    """Kind of device of the units; empty: not stated."""
     rows: Literal["samples", "dwells"] = "samples"
     rate_hz: Annotated[float, Field(gt=0.0, le=FASTEST_HZ)] | None = None
     axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1, max_length=3)] = NEEDED
