@@ -33,6 +33,7 @@ def import_document(
     fit : the name of a fit; empty: none
     working : shows what is done, until it is
     """
+    from pipelines.diagnosis.inputs import file_beside
     from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
     from pipelines.importers.dwell_list import dwell_rows
@@ -49,7 +50,12 @@ def import_document(
         content, source, breaks = sources.read(
             paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
         )
-        if "columns" not in keys and is_exchange(content.table.columns):
+        exchange, unread = "columns" not in keys and is_exchange(content.table.columns), ()
+        if exchange and stated is not None:
+            keys, unread = mapped.of_exchange(content.table, keys)
+            if beside := file_beside(str(paths[0]), "history"):
+                unread += (f"temperatures that are not read with --references: {Path(beside).name}",)
+        elif exchange:
             return _table_of_dwells(content.table, keys, paths[0], source, fit, archive, slip)
         how = _mapping(keys, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
@@ -73,7 +79,7 @@ def import_document(
         "out_unit": data.out_unit,
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
-        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips, *slip],
+        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips, *slip, *unread],
         "faults": list(data.faults),
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,

@@ -226,7 +226,12 @@ def test_an_import_that_was_not_fitted_is_advised_and_a_fit_that_fails_leaves_no
 
 
 def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
-    first = document_of(*hand_held(*STATED, "--fit", "norm", "--device", "adxl355"))
+    make(Recording(48, "white 280, B 30"), 4714).dwells.assign(unit="H1", pose="by hand").to_csv(
+        "table.csv", index=False
+    )
+    words = ("--unit-of", "output=LSB", *STATED, "--fit", "norm", "--device", "adxl355")
+    first = document_of("import", "table.csv", *words)  # in the exchange format
+    assert "columns that are not read with --references: pose" in first["remarks"]
     assert (first["device"], "device: " in str(first["remarks"])) == ("ADXL355", False)
     assert any(remark.startswith("held out for verification: H1: ") for remark in first["remarks"])
     fitted = document_of("fit", first["run"], "--limits", "limits.toml")
