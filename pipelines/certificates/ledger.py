@@ -117,7 +117,8 @@ class Ledger:
                 calibration for calibration in chosen if calibration.until > (day or ("" if certificate else today()))
             ]
             if not meant:
-                raise WrongUse(nothing_to_revoke(serial, known, certificate, day))
+                hint = "" if events else Archive(self.root).units_like(serial)
+                raise WrongUse(nothing_to_revoke(serial, known, certificate, day, hint))
             start = day or min(calibration.start for calibration in meant)
             ends = tuple(calibration.event.sequence for calibration in meant)
             last = meant[-1].event
