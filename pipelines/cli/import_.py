@@ -20,7 +20,7 @@ from pipelines.cli.options import (
 )
 from pipelines.cli.printing import conclude, error_console, print_table, say, short, short_values
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
 from schemas.tables import ADEQUATE, NOT_JUDGED
 
@@ -34,6 +34,7 @@ EXAMPLES = (
 
 WAVEFORMS = ("reference", "x", "y", "z")
 """Channels that make an import of a sweep one of waveforms, not of points."""
+LONGEST_DEVICE = 64
 METHODS = ("norm", "plane", "faces", "temperature")
 
 
@@ -63,6 +64,7 @@ KEYS = {
     "axes": Setting("x,y,z", "order of the mapped axes", _listed),
     "signs": Setting("+,+,+", "signs of the axes in that order", _listed),
     "verify": Setting("N|N%", "dwells that the fit does not use; they verify it"),
+    "zone": Setting("NAME", "zone of local times that state none, such as Europe/Berlin"),
     "measured": Setting("DATE", "day of the measurement"),
     "zero_output": Setting("VALUE", "nominal output at 0 g, 0 by default", float),
     **READING,
@@ -148,6 +150,8 @@ def command(
         **given,
     }
     keys |= {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
+    device, slip = _device(str(keys.get("device", "")))
+    keys |= {"device": device} if device else {}
     if fit and fit not in METHODS:
         raise WrongUse(
             f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
@@ -160,6 +164,8 @@ def command(
     sets = [files] if keys.get("join") else [[path] for path in files]
     working, where = error_console().status, str(file or "import")
     imports = [import_document(paths, keys, where, fit, archive, stated, working) for paths in sets]
+    for imported in imports:
+        imported["remarks"] += slip
     verdicts = [imported["adequate"] for imported in imports if imported["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     document = imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate}
@@ -190,7 +196,6 @@ def _transfer(
 
     stated : columns and units as the options have them, and the file of --set
     """
-    from pipelines.importers.keep import stated_device
     from pipelines.importers.transfer import import_transfer
     from pipelines.importers.transfer_columns import stated_layout
 
@@ -198,7 +203,7 @@ def _transfer(
         raise WrongUse("import: no serial number, a transfer function needs one; add --units SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
     layout = stated_layout(*stated)
-    device, slip = stated_device(device)
+    device, slip = _device(device)
     imported = [import_transfer(path, unit, model, archive, layout, device) for path in files]
     for transfer in imported:
         transfer["text"] += slip
@@ -224,7 +229,6 @@ def _waveforms(
 
     stated : columns and units as the options have them, rate in Hz, group
     """
-    from pipelines.importers.keep import stated_device
     from pipelines.importers.mapping import pairs
     from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 
@@ -232,12 +236,29 @@ def _waveforms(
         raise WrongUse("import: no serial number, the recordings of a test need one; add --units SN")
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
-    device, slip = stated_device(device)
+    device, slip = _device(device)
     imported = import_waveforms(paths, procedure, part, unit, layout, archive, device)
     imported["text"] += slip
     held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
     passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
     conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
+
+
+def _device(name: str) -> tuple[str, tuple[str, ...]]:
+    """The kind of device that an import states, a preset as it is spelled; and what is to be said of the name."""
+    if not name:
+        return "", ()
+    from stations.plant.preset import preset_names
+
+    if not (name.isprintable() and name == name.strip() and len(name) <= LONGEST_DEVICE):
+        raise WrongUse(
+            f"--device: found '{shown(name)}', 1 to {LONGEST_DEVICE} printable characters are needed; correct it"
+        )
+    known = preset_names()
+    spelled = next((preset for preset in known if preset.lower() == name.lower()), name)
+    close = close_matches(name, known) if spelled not in known else ()
+    slip = f"device: {spelled} is not one that the program knows; {did_you_mean(name, close)} Then import again with it"
+    return spelled, (slip,) if close else ()
 
 
 def _named(units: Sequence[str], device: str | None) -> str:

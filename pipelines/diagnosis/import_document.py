@@ -40,8 +40,6 @@ def import_document(
     from pipelines.importers.pose_check import CHECK_AXIS
 
     name = " + ".join(path.name for path in paths)
-    device, slip = keep.stated_device(str(keys.get("device", "")))
-    keys = {**keys, "device": device} if device else keys
     columns, units = keys.get("columns"), keys.get("units")
     if isinstance(columns, dict) and isinstance(units, dict) and "output" in units:
         mapped.build(keys, where)  # an error of the mapping is reported before a file is read
@@ -56,7 +54,7 @@ def import_document(
             if beside := file_beside(str(paths[0]), "history"):
                 unread += (f"temperatures that are not read with --references: {Path(beside).name}",)
         elif exchange:
-            return _table_of_dwells(content.table, keys, paths[0], source, fit, archive, slip)
+            return _table_of_dwells(content.table, keys, paths[0], source, fit, archive)
         how = _mapping(keys, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
     judged = None
@@ -75,11 +73,11 @@ def import_document(
         "run": run.id,
         "source": source.as_dict(),
         "units": data.units,
-        "device": device or None,
+        "device": how.device or None,
         "out_unit": data.out_unit,
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
-        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips, *slip, *unread],
+        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips, *unread],
         "faults": list(data.faults),
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,
@@ -90,13 +88,7 @@ def import_document(
 
 
 def _table_of_dwells(
-    table: pd.DataFrame,
-    keys: dict[str, Any],
-    path: Path,
-    source: SourceFile,
-    fit: str,
-    archive: str | None,
-    slip: tuple[str, ...],
+    table: pd.DataFrame, keys: dict[str, Any], path: Path, source: SourceFile, fit: str, archive: str | None
 ) -> dict[str, Any]:
     """A table of dwells in the exchange format, which states by its columns what a mapping would."""
     from pipelines.diagnosis.inputs import file_beside
@@ -122,7 +114,7 @@ def _table_of_dwells(
         "out_unit": str(dwells["out_unit"].iloc[0]) if "out_unit" in dwells.columns else "",
         "samples": 0,
         "dwells": len(dwells),
-        "remarks": [*remarks, *slip, *([f"temperatures between the dwells: {Path(beside).name}"] if beside else [])],
+        "remarks": [*remarks, *([f"temperatures between the dwells: {Path(beside).name}"] if beside else [])],
         "faults": [],
         "fit": None,
         "adequate": None,

@@ -21,12 +21,9 @@ from pipelines.importers.record import Imported
 from pipelines.importers.record_dwells import turned
 from pipelines.importers.unit_check import DOUBT, size_of, unit_of
 from pipelines.tables.dwell_table import output_axes
-from schemas.errors import WrongUse, close_matches, did_you_mean
+from schemas.errors import WrongUse
 from schemas.foreign import shown
 from schemas.import_references import ImportReferences
-from stations.plant.preset import preset_names
-
-LONGEST_DEVICE = 64
 
 
 def keep_tables(
@@ -56,21 +53,6 @@ def keep_tables(
     run.flush(last=START)  # together: a full disk leaves no run without its tables
     run.seal()
     return Run(store, run.id)
-
-
-def stated_device(name: str) -> tuple[str, tuple[str, ...]]:
-    """The kind of device that an import states, a preset as it is spelled; and what is to be said of the name."""
-    if not name:
-        return "", ()
-    if not (name.isprintable() and name == name.strip() and len(name) <= LONGEST_DEVICE):
-        raise WrongUse(
-            f"--device: found '{shown(name)}', 1 to {LONGEST_DEVICE} printable characters are needed; correct it"
-        )
-    known = preset_names()
-    spelled = next((preset for preset in known if preset.lower() == name.lower()), name)
-    close = close_matches(name, known) if spelled not in known else ()
-    slip = f"device: {spelled} is not one that the program knows; {did_you_mean(name, close)} Then import again with it"
-    return spelled, (slip,) if close else ()
 
 
 def lot_of_import(units: list[str], dwells: pd.DataFrame | None = None, device: str = "") -> dict[str, Any]:

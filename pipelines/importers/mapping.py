@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from zoneinfo import available_timezones
 
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
@@ -90,6 +91,8 @@ class Mapping(BaseModel):
     """Serial number, if the file has no column for it."""
     device: str = ""
     """Kind of device of the units; empty: not stated."""
+    zone: str = ""
+    """Zone of stamps of date and time that state none, such as Europe/Berlin; empty: their clock was not changed."""
     rows: Literal["samples", "dwells"] = "samples"
     rate_hz: Annotated[float, Field(gt=0.0, le=FASTEST_HZ)] | None = None
     axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1, max_length=3)] = NEEDED
@@ -145,6 +148,16 @@ class Mapping(BaseModel):
                     f"'{shown(name)}': a name of 1 to {LONGEST_NAME} printable characters is needed; choose another"
                 )
         return columns
+
+    @field_validator("zone")
+    @classmethod
+    def _in_the_database(cls, value: str) -> str:
+        if value and value not in (known := available_timezones()):
+            close = did_you_mean(
+                value, close_matches(value, known) or ("Europe/Berlin, and others of the IANA data base",)
+            )
+            raise ValueError(f"no zone '{shown(value)}'; {close}")
+        return value
 
     @field_validator("axes")
     @classmethod
