@@ -18,7 +18,7 @@ SOAKS_ALARM = 0.01
 """Probability that any pose of a good unit is taken to have another error at each soak.
 
 Found in 40 lots: 1 of 160 units, with flicker 2; an error that is odd in the temperature in 31 and 34 of 40 where it is twice the
-uncertainty of a dwell, in all where it is three times that. The means of single soaks alone would be those of the device's wander:
+uncertainty of a dwell, in all where it is three times that. The means of single soaks alone would show the device's wander:
 671 to 888 µg in the units of the main job, whose poses are 201 to 471 µg off.
 """
 

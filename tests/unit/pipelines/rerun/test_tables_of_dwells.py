@@ -203,7 +203,7 @@ def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
 def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None:
     path = tmp_path / "lot.csv"
     table(np.random.default_rng(8)).assign(slot=3).to_csv(path, index=False)
-    with pytest.raises(WrongUse, match=r"takes --unit-of output=… alone \(found local_gravity_m_s2\)"):
+    with pytest.raises(WrongUse, match=r"takes --unit-of output=… and --device alone \(found local_gravity_m_s2\)"):
         import_document([path], {"local_gravity_m_s2": 9.8}, "", "", str(tmp_path / "archive"), None, nullcontext)
     done = import_document([path], {"units": {"output": "mg"}}, "", "", str(tmp_path / "archive"), None, nullcontext)
     run = Archive(str(tmp_path / "archive")).run(done["run"])
