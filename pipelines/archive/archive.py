@@ -111,8 +111,11 @@ class Archive:
         """The records of a capture, for reading or for continuing."""
         return Records(self.root / "captures" / capture_id)
 
-    def run(self, name: str) -> Run:
-        """The run of this id, of this unambiguous beginning, or ``latest``."""
+    def run(self, name: str, *, or_unit: bool = False) -> Run:
+        """The run of this id, of this unambiguous beginning, or ``latest``.
+
+        or_unit : the name may have been meant as a serial number, for the message where there is no such run
+        """
         self._refuse_other_format()
         if PLAIN.fullmatch(name) and (self.root / "runs" / name / START).is_file():
             return Run(self, name)
@@ -134,9 +137,10 @@ class Archive:
             message = f"{where}: {begun}, one is needed; write more of it"
         elif ids:
             close = close_matches(name, ("latest", *ids))
-            message = (
-                f"{where}: no run is called '{name}'; {did_you_mean(name, close) if close else f'known: {_few(ids)}'}"
-            )
+            hint = did_you_mean(name, close) if close else f"known: {_few(ids)}"
+            message = f"{where}: no run is called '{name}'; {hint}"
+            if or_unit:
+                message = f"{where}: '{name}' is no run, and no unit with a certificate; {self.units_like(name, close) or hint}"
         else:
             message = f"{where}: there is no run yet; make one with 'tumbleline run'"
         raise WrongUse(message)
@@ -144,6 +148,18 @@ class Archive:
     def table(self, run: str, name: str) -> pd.DataFrame:
         """A table of a run."""
         return self.run(run).table(name)
+
+    def units_like(self, serial: str, others: Sequence[str] = ()) -> str:
+        """The end of a message that no unit of this serial has a certificate, else empty.
+
+        others : names that may have been meant besides
+        """
+        runs = self.runs()
+        measured = [info.id for info in runs if serial in info.units]
+        if measured:
+            return f"it was measured in {_few(measured)}: 'tumbleline certificate issue RUN' certifies what passed"
+        close = close_matches(serial, {unit for info in runs for unit in info.units} | {*others})
+        return did_you_mean(serial, close) if close else ""
 
     def runs(self) -> list[RunInfo]:
         """Every run, in the order of their start."""

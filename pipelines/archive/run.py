@@ -167,7 +167,7 @@ class Run:
 
         if name not in tables.TABLES:
             raise WrongUse(f"archive: no table is called '{name}'; {did_you_mean(name, tables.TABLES)}")
-        if self.about.get("lot", {}).get("device") == "imported" and not path.is_file():
+        if self.about.get("lot") and not self.about.get("capture") and not path.is_file():
             raise ArchiveUnusable(
                 f"archive: run {self.id} was imported and has no table '{name}', which a fit of its dwells makes; fit it with "
                 f"'tumbleline rerun {self.id} --effects a,b,c' and name that run"

@@ -17,7 +17,7 @@ from pipelines.audit.parameters import FAMILY_OF, NAMES
 DAY_S = 86400.0
 CLOCK_SET_D = 366.0  # a clock that was never set shows 1970
 IMPORTED = "IMPORTED"
-"""Kind of device of units whose measurements came from elsewhere."""
+"""Kind of device of imported units that state none."""
 DATE = "a date such as 2026-05-01T09:30:00Z is needed"
 
 
@@ -85,10 +85,10 @@ def dated_runs(index: AuditIndex) -> pd.DataFrame:
 def first_runs(index: AuditIndex, runs: pd.DataFrame, until: float) -> pd.DataFrame:
     """Runs that were measured before ``until``, with their day, device and station; each capture once, by its first run.
 
-    An import is measured elsewhere and becomes a calibration by a fit with limits: it counts by the last of these.
+    An import has no capture and becomes a calibration by a fit with limits: it counts by the last of these.
     """
     graded = set(index.table("units")["run"].to_pylist())
-    imports = runs.loc[(runs["rerun_of"] == "") & (runs["device"] == IMPORTED), "run"]
+    imports = runs.loc[(runs["rerun_of"] == "") & (runs["capture"] == ""), "run"]
     fits = runs[runs["rerun_of"].isin(imports) & runs["run"].isin(graded)].sort_values("started", kind="stable")
     fits = fits.drop_duplicates("rerun_of", keep="last")
     runs = runs[(runs["rerun_of"] == "") & ~runs["run"].isin(fits["rerun_of"]) | runs["run"].isin(fits["run"])]

@@ -146,6 +146,7 @@ class RevokeDocument(LedgerEntryDocument):
     action: Literal["certify", "supersede", "revoke"]
     unit: str
     revoked: Annotated[list[str], "certificates that it ends"]
+    still_valid: Annotated[list[str], "certificates of the same measurements that hold today or later"]
 
 
 class FileCheckDocument(TypedDict):

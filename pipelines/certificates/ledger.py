@@ -17,6 +17,7 @@ from pipelines.archive.provenance import provenance
 from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.days import LAST, today
 from pipelines.certificates.entries import LedgerEntry, event_of, folder_of, numbered_files
+from pipelines.certificates.measured import same_measurement
 from pipelines.certificates.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
 from pipelines.certificates.validity import Calibration, calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
@@ -78,6 +79,7 @@ class Ledger:
         amend : whether it takes the place of a certificate of the same run that holds on its first day; else that one stands
         """
         refuse_serial(event.serial, "certify")
+        event = replace(event, reason=event.reason.strip())
         there: list[LedgerEntry] = []
 
         def decided(events: Sequence[LedgerEntry]) -> LedgerEntry | None:
@@ -115,7 +117,8 @@ class Ledger:
                 calibration for calibration in chosen if calibration.until > (day or ("" if certificate else today()))
             ]
             if not meant:
-                raise WrongUse(nothing_to_revoke(serial, known, certificate, day))
+                hint = "" if events else Archive(self.root).units_like(serial)
+                raise WrongUse(nothing_to_revoke(serial, known, certificate, day, hint))
             start = day or min(calibration.start for calibration in meant)
             ends = tuple(calibration.event.sequence for calibration in meant)
             last = meant[-1].event
@@ -215,15 +218,28 @@ def _stamped(event: LedgerEntry, known: Sequence[tuple[LedgerEntry, str]]) -> Le
 
 
 def _same(calibration: Calibration, event: LedgerEntry) -> bool:
-    """Whether an event would certify a valid calibration again."""
+    """Whether an event would certify a valid calibration again, and states no other reason, which would amend it."""
     old = (calibration.run, calibration.event.coefficients, calibration.start, calibration.until)
-    return old == (event.run, event.coefficients, event.start, event.until)
+    repeated = old == (event.run, event.coefficients, event.start, event.until)
+    return repeated and event.reason in {"", calibration.event.reason}
 
 
 def _stands_for(calibration: Calibration, event: LedgerEntry) -> bool:
     """Whether a calibration of the same run, of what the event covers, holds on the first day of the event."""
     old = (calibration.run, calibration.event.coefficients, calibration.event.covers)
     return old == (event.run, event.coefficients, event.covers) and calibration.holds(event.start)
+
+
+def left_valid(archive: Archive, serial: str, ended: Sequence[int]) -> list[str]:
+    """Numbers of the unit's certificates that hold today or later, of the measurements of others that were ended."""
+    known = {calibration.event.sequence: calibration for calibration in Ledger(archive).calibrations(serial)}
+    runs = [Run(archive, run) for run in dict.fromkeys(known[number].run for number in ended)]
+    return [
+        calibration.certificate
+        for calibration in known.values()
+        if calibration.until > max(calibration.start, today())
+        and any(same_measurement(run, calibration.run) for run in runs)
+    ]
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:

@@ -79,16 +79,18 @@ def refuse_other_device(known: Sequence[Calibration], event: LedgerEntry) -> Non
         )
 
 
-def nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: int, day: str) -> str:
+def nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: int, day: str, hint: str = "") -> str:
     """The message that there is no such calibration.
 
     Parameters
     ----------
     known : the unit's that hold on any day.
     certificate : sequence of the certificate that was meant; 0 for any.
+    hint : what may have been meant instead.
     """
     if not known:
-        return f"revoke: unit {serial!r} has no calibration that holds, one is needed; see 'tumbleline show' with --at"
+        hint = hint or "see 'tumbleline show' with --at"
+        return f"revoke: unit {serial!r} has no calibration that holds, one is needed; {hint}"
     listed = ", ".join(
         f"{calibration.certificate} ({calibration.start} to {calibration.until})" for calibration in known
     )

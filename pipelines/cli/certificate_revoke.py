@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from pipelines.archive import Archive, Run
+from pipelines.cli.next_commands import archive_words, command_line
 from pipelines.cli.options import ArchiveOption, JsonOption, ReasonOption, argument, option
 from pipelines.cli.printing import give
 
@@ -23,6 +24,7 @@ def revoke(
     """Revoke a unit's calibration, with the reason. Nothing is deleted: the revocation is added to the ledger of the unit."""
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of
+    from pipelines.certificates.ledger import left_valid
     from pipelines.report import renew_report
 
     store = Archive(archive)
@@ -33,5 +35,10 @@ def revoke(
         calibration.run for calibration in ledger.calibrations(serial) if calibration.certificate in ended
     ):
         renew_report(Run(store, run))
+    valid = left_valid(store, serial, event.ends)
     lines = [f"revoked {', '.join(ended)} from {event.start} on: {event.reason}"]
-    give({"unit": serial, "revoked": ended, **event.document()}, lines, as_json=as_json)
+    for other in valid:
+        words = (serial, other.removeprefix(f"{serial}/"), "--reason", event.reason, *archive_words(archive))
+        command = command_line("certificate", "revoke", *words)
+        lines.append(f"{other}, of the same measurements, stays valid; '{command}' revokes it")
+    give({"unit": serial, "revoked": ended, "still_valid": valid, **event.document()}, lines, as_json=as_json)

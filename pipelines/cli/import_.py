@@ -20,7 +20,7 @@ from pipelines.cli.options import (
 )
 from pipelines.cli.printing import conclude, error_console, print_table, say, short, short_values
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
 from schemas.tables import ADEQUATE, NOT_JUDGED
 
@@ -34,6 +34,7 @@ EXAMPLES = (
 
 WAVEFORMS = ("reference", "x", "y", "z")
 """Channels that make an import of a sweep one of waveforms, not of points."""
+LONGEST_DEVICE = 64
 METHODS = ("norm", "plane", "faces", "temperature")
 
 
@@ -63,6 +64,7 @@ KEYS = {
     "axes": Setting("x,y,z", "order of the mapped axes", _listed),
     "signs": Setting("+,+,+", "signs of the axes in that order", _listed),
     "verify": Setting("N|N%", "dwells that the fit does not use; they verify it"),
+    "zone": Setting("NAME", "zone of local times that state none, such as Europe/Berlin"),
     "measured": Setting("DATE", "day of the measurement"),
     "zero_output": Setting("VALUE", "nominal output at 0 g, 0 by default", float),
     **READING,
@@ -85,6 +87,7 @@ def command(
         list[str] | None, option("--unit-of output=LSB,time=s,temperature=degC", "Units of measure of the columns.")
     ] = None,
     units: Annotated[str, option("--units SN", "Serial number, if no column has it.")] = "",
+    device: Annotated[str, option("--device PRESET|NAME", "Kind of device; audit and discover compare its like.")] = "",
     rate: Annotated[float | None, option("--rate HZ", "Rate of samples without a time.")] = None,
     setting: Annotated[
         list[str] | None,
@@ -132,9 +135,9 @@ def command(
         raise WrongUse(f"import: --set {other[0]} is for records at rest, --procedure is given; leave it out")
     if procedure and waveforms:
         layout = (listed, stated_units, rate, given.get("group", ""))
-        _waveforms(files, procedure, file, units, layout, archive, as_json=as_json)
+        _waveforms(files, procedure, file, units, layout, archive, device, as_json=as_json)
     if procedure:
-        _transfer(files, units, effects, (listed, stated_units, file), archive, as_json=as_json)
+        _transfer(files, units, effects, (listed, stated_units, file), archive, device, as_json=as_json)
     from pipelines.diagnosis.import_document import import_document
 
     keys: dict[str, Any] = mapped.from_file(file) if file else {}
@@ -142,10 +145,13 @@ def command(
         "columns": mapped.pairs(listed, "--map"),
         "units": mapped.pairs(stated_units, "--unit-of"),
         "unit": units,
+        "device": device,
         "rate_hz": rate,
         **given,
     }
     keys |= {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
+    device, slip = _device(str(keys.get("device", "")))
+    keys |= {"device": device} if device else {}
     if fit and fit not in METHODS:
         raise WrongUse(
             f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
@@ -158,6 +164,8 @@ def command(
     sets = [files] if keys.get("join") else [[path] for path in files]
     working, where = error_console().status, str(file or "import")
     imports = [import_document(paths, keys, where, fit, archive, stated, working) for paths in sets]
+    for imported in imports:
+        imported["remarks"] += slip
     verdicts = [imported["adequate"] for imported in imports if imported["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     document = imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate}
@@ -180,6 +188,7 @@ def _transfer(
     effects: str,
     stated: tuple[str, str, Path | None],
     archive: str | None,
+    device: str,
     *,
     as_json: bool,
 ) -> NoReturn:
@@ -194,7 +203,10 @@ def _transfer(
         raise WrongUse("import: no serial number, a transfer function needs one; add --units SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
     layout = stated_layout(*stated)
-    imported = [import_transfer(path, unit, model, archive, layout) for path in files]
+    device, slip = _device(device)
+    imported = [import_transfer(path, unit, model, archive, layout, device) for path in files]
+    for transfer in imported:
+        transfer["text"] += slip
     document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
     passed = all(transfer["adequate"] is True for transfer in imported)
     conclude(document, lambda _: _print_transfers(imported), as_json=as_json, passed=passed)
@@ -207,6 +219,7 @@ def _waveforms(
     unit: str,
     stated: tuple[str, str, float | None, str],
     archive: str | None,
+    device: str,
     *,
     as_json: bool,
 ) -> NoReturn:
@@ -223,22 +236,50 @@ def _waveforms(
         raise WrongUse("import: no serial number, the recordings of a test need one; add --units SN")
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
-    imported = import_waveforms(paths, procedure, part, unit, layout, archive)
+    device, slip = _device(device)
+    imported = import_waveforms(paths, procedure, part, unit, layout, archive, device)
+    imported["text"] += slip
     held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
     passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
     conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
 
 
+def _device(name: str) -> tuple[str, tuple[str, ...]]:
+    """The kind of device that an import states, a preset as it is spelled; and what is to be said of the name."""
+    if not name:
+        return "", ()
+    from stations.plant.preset import preset_names
+
+    if not (name.isprintable() and name == name.strip() and len(name) <= LONGEST_DEVICE):
+        raise WrongUse(
+            f"--device: found '{shown(name)}', 1 to {LONGEST_DEVICE} printable characters are needed; correct it"
+        )
+    known = preset_names()
+    spelled = next((preset for preset in known if preset.lower() == name.lower()), name)
+    close = close_matches(name, known) if spelled not in known else ()
+    slip = f"device: {spelled} is not one that the program knows; {did_you_mean(name, close)} Then import again with it"
+    return spelled, (slip,) if close else ()
+
+
+def _named(units: Sequence[str], device: str | None) -> str:
+    """The units of an import with their kind of device, where it is stated."""
+    return ", ".join(units) + (f" ({device})" if device else "")
+
+
 def _print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
     for transfer in imports:
-        say(f"{transfer['unit']}: {transfer['points']} points, kept as run {transfer['run']}")
+        say(
+            f"{_named([transfer['unit']], transfer['device'])}: {transfer['points']} points, kept as run {transfer['run']}"
+        )
         for line in transfer["text"]:
             say(f"  {line}")
         print_verdict_of_fit(transfer["adequate"], "the model does not describe these points")
 
 
 def _print_waveforms(imported: Mapping[str, Any]) -> None:
-    say(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
+    say(
+        f"{_named([imported['unit']], imported['device'])}: {imported['records']} recordings, kept as run {imported['run']}"
+    )
     rows = [
         [
             figure["figure"],
@@ -264,7 +305,7 @@ def _print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: ob
         dwells = number_of(imported["dwells"], "dwell")
         rows = f"{number_of(imported['samples'], 'sample')}, {dwells}" if imported["samples"] else dwells
         unit = imported["out_unit"] or "a unit that is not known (--unit-of output=… states it)"
-        say(f"{', '.join(imported['units'])}: {rows} in {unit}, kept as run {imported['run']}")
+        say(f"{_named(imported['units'], imported['device'])}: {rows} in {unit}, kept as run {imported['run']}")
         for remark in [*imported["remarks"], *imported["lines"]]:
             say(f"  {remark}")
         if list_dwells:

@@ -51,7 +51,7 @@ def command(
     store = Archive(archive)
     if at or known or (not report and _is_unit(store, run)):
         raise typer.Exit(DONE if show_validity(store, run, at, known, as_json=as_json) else PART_FAILED)
-    shown_run = store.run(run)
+    shown_run = store.run(run, or_unit=True)
     if report:
         from pipelines.report import make_report
 
@@ -152,9 +152,8 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
     day = day_of(at, "--at") if at else today()
     history = Ledger(archive).calibrations(serial, day_of(known, "--known") if known else "")
     if not history:
-        raise WrongUse(
-            f"show: unit {serial!r} has no calibration in archive {archive.root}; certify one with 'tumbleline certificate issue'"
-        )
+        hint = archive.units_like(serial) or "certify one with 'tumbleline certificate issue'"
+        raise WrongUse(f"show: unit {serial!r} has no calibration in archive {archive.root}; {hint}")
     # of a unit that has coefficients, and results of an exciter, the coefficients are meant
     first = sorted(history, key=lambda calibration: STATIC not in calibration.event.covers.split())
     valid = next((calibration for calibration in first if calibration.holds(day)), None)

@@ -33,6 +33,7 @@ def import_document(
     fit : the name of a fit; empty: none
     working : shows what is done, until it is
     """
+    from pipelines.diagnosis.inputs import file_beside
     from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
     from pipelines.importers.dwell_list import dwell_rows
@@ -47,7 +48,12 @@ def import_document(
         content, source, breaks = sources.read(
             paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
         )
-        if "columns" not in keys and is_exchange(content.table.columns):
+        exchange, unread = "columns" not in keys and is_exchange(content.table.columns), ()
+        if exchange and stated is not None:
+            keys, unread = mapped.of_exchange(content.table, keys)
+            if beside := file_beside(str(paths[0]), "history"):
+                unread += (f"temperatures that are not read with --references: {Path(beside).name}",)
+        elif exchange:
             return _table_of_dwells(content.table, keys, paths[0], source, fit, archive)
         how = _mapping(keys, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
@@ -67,10 +73,11 @@ def import_document(
         "run": run.id,
         "source": source.as_dict(),
         "units": data.units,
+        "device": how.device or None,
         "out_unit": data.out_unit,
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
-        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips],
+        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips, *unread],
         "faults": list(data.faults),
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,
@@ -88,21 +95,22 @@ def _table_of_dwells(
     from pipelines.importers.exchange import checked, read_history
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
-    if fit or set(keys) - {"units"}:
-        more = [*sorted(set(keys) - {"units"}), *(["fit"] if fit else [])]
+    if fit or set(keys) - {"units", "device"}:
+        more = [*sorted(set(keys) - {"units", "device"}), *(["fit"] if fit else [])]
         raise WrongUse(
-            f"import: {path.name} is a table of dwells in the exchange format, which takes --unit-of output=… alone (found "
-            f"{', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
+            f"import: {path.name} is a table of dwells in the exchange format, which takes --unit-of output=… and --device alone "
+            f"(found {', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
         )
-    beside = file_beside(str(path), "history")
+    beside, device = file_beside(str(path), "history"), str(keys.get("device", ""))
     dwells, remarks = complete_table(
         checked(table, where=path.name, foreign=True), keys.get("units", {}).get("output", "")
     )
-    run = keep_table_of_dwells(dwells, read_history(beside) if beside else None, path.name, archive, source)
+    run = keep_table_of_dwells(dwells, read_history(beside) if beside else None, path.name, archive, source, device)
     return {
         "run": run.id,
         "source": source.as_dict(),
         "units": list(dict.fromkeys(dwells["unit"].astype(str))),
+        "device": device or None,
         "out_unit": str(dwells["out_unit"].iloc[0]) if "out_unit" in dwells.columns else "",
         "samples": 0,
         "dwells": len(dwells),

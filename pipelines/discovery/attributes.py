@@ -15,7 +15,7 @@ from pipelines.archive.attributes import FOLDER, attribute_files, known_attribut
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.discovery.documents import AddedAttributes, KnownAttribute, ListedAttributes
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import WrongUse, close_matches, did_you_mean
 
 By = Literal["serial", "run"]
 
@@ -56,11 +56,14 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
     file = _append(archive, {"by": by, "source": source, "values": new, **provenance()}) if new else ""
     infos = archive.runs()
     present = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
+    unknown = [subject for subject in values if subject not in present]
+    similar = {subject: [*close] for subject in unknown[:_SHOWN] if (close := close_matches(subject, present))}
     return {
         **counts,  # type: ignore[typeddict-item]  # the three counts
         "by": by,
         "names": names,
-        "unknown": [subject for subject in values if subject not in present],
+        "unknown": unknown,
+        "similar": similar,
         "refused": refused,
         "file": file,
     }
@@ -138,6 +141,7 @@ def sentences(added: AddedAttributes) -> list[str]:
     if added["unknown"]:
         counted = number_of(len(added["unknown"]), str(added["by"]))
         lines.append(f"not in the archive yet: {counted} ({_some(added['unknown'], _SHOWN)}); they are kept")
+        lines += [f"{subject}: {did_you_mean(subject, close)}" for subject, close in added["similar"].items()]
     if added["refused"]:
         lines.append(f"not taken, because they follow from the result: {', '.join(added['refused'])}")
     return lines

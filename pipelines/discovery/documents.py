@@ -190,6 +190,7 @@ class AddedAttributes(TypedDict):
     by: Annotated[str, "serial or run"]
     names: Annotated[list[str], "of the attributes"]
     unknown: Annotated[list[str], "serials or runs that the archive does not have yet"]
+    similar: Annotated[dict[str, list[str]], "of the first five unknown ones, those of the archive that are similar"]
     refused: Annotated[list[str], "columns that follow from the result of a calibration, and were not taken"]
     file: Annotated[str, "where they are kept, in the archive"]
 

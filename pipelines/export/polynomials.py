@@ -20,7 +20,7 @@ from pipelines.export.unit_noise import UnitNoise, noise_of_units
 from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.stages.figures import plain_reason
 from pipelines.tables.calibration import Calibration, read_calibration
-from schemas.errors import RecipeInvalid, WrongUse
+from schemas.errors import RecipeInvalid, WrongUse, did_you_mean
 from stations.plant.preset import load_preset
 
 BIAS = ("bias", "bias_temperature", "bias_temperature_quadratic", "bias_temperature_cubic")
@@ -252,7 +252,7 @@ def _not_revoked(
 def _refuse_unknown(serials: tuple[str, ...], units: Collection[str]) -> None:
     for unit in serials:
         if unit not in units:
-            raise WrongUse(f"export: no unit {unit} in this run; there are {', '.join(units)}")
+            raise WrongUse(f"export: no unit {unit} in this run; {did_you_mean(unit, units)}")
 
 
 def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> None:

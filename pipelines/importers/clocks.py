@@ -15,6 +15,7 @@ import pandas as pd
 
 from inertial.arrays import Array
 from pipelines.importers import values
+from pipelines.importers.local_time import local_seconds
 from pipelines.importers.mapping import TIME_UNITS
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import foreign, shown
@@ -30,6 +31,7 @@ _CLOCK = re.compile(r"^\s*(\d{1,2}:\d{2}:\d{2}(?:[.,:]\d+)?)\s*$")
 _MINUTES = re.compile(r"^\s*(\d{1,3}):([0-5]\d[.,]\d+)\s*$")
 """Minutes and seconds, as a spreadsheet shows a time of day with fractions: without hours, 59:59.9 is followed by 00:00.0."""
 _FRACTION = re.compile(r"(:\d{2}),(\d+)")
+_ZONED = re.compile(r":\d{2}(?:\.\d*)?\s*(?:Z|UTC|[+-]\d{2}:?\d{0,2})$", re.IGNORECASE)
 _FORMATS = (
     *("ISO8601", "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d-%b-%Y %H:%M:%S.%f", "%d-%b-%Y %H:%M:%S"),
     *("%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S"),
@@ -114,8 +116,12 @@ def _epoch(numbers: Array) -> str:
     return ""
 
 
-def stamps(column: pd.Series, where: str) -> Array:
-    """Seconds since the first of stamps of date and time, or of the time of day.
+def stamps(column: pd.Series, where: str, zone: str = "") -> RecordingClock:
+    """The clock of stamps of date and time, or of the time of day.
+
+    Parameters
+    ----------
+    zone : of stamps with a date that state none; empty: not known
 
     Raises
     ------
@@ -128,17 +134,17 @@ def stamps(column: pd.Series, where: str) -> Array:
         with foreign(f"{where}: column '{name}': times of day that cannot be read", "give seconds, or ISO stamps"):
             pointed = text.str.replace(r":(\d+)$", r".\1", regex=True) if text.iloc[0].count(":") == 3 else text
             spans = pd.to_timedelta(pointed)
-        return _unwrapped(np.asarray(spans.dt.total_seconds(), dtype=np.float64), _DAY_S)
+        return RecordingClock(_unwrapped(np.asarray(spans.dt.total_seconds(), dtype=np.float64), _DAY_S), "s", ())
     if column.notna().all() and bool(text.str.match(_MINUTES).all()):
         parts = text.str.replace(",", ".", regex=False).str.split(":", expand=True).astype(float).to_numpy()
-        return _unwrapped(60.0 * parts[:, 0] + parts[:, 1], _HOUR_S)
-    plain = _read(text, _FORMATS, where)
+        return RecordingClock(_unwrapped(60.0 * parts[:, 0] + parts[:, 1], _HOUR_S), "s", ())
+    plain = _read(text, _FORMATS, where, zone)
     if plain is not None:
         return plain
     candidates = [
-        instants for forms in (_DAY_FIRST, _MONTH_FIRST) if (instants := _read(text, forms, where)) is not None
+        instants for forms in (_DAY_FIRST, _MONTH_FIRST) if (instants := _read(text, forms, where, zone)) is not None
     ]
-    if len(candidates) == 2 and not np.allclose(candidates[0], candidates[1]):
+    if len(candidates) == 2 and not np.allclose(candidates[0].seconds, candidates[1].seconds):
         raise DataRejected(
             f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month are ambiguous, and the date changes; "
             "write the dates as 2026-12-31"
@@ -158,15 +164,18 @@ def _unwrapped(seconds: Array, period_s: float) -> Array:
     return seconds + period_s * periods - seconds[0]
 
 
-def _read(text: pd.Series, forms: Sequence[str], where: str) -> Array | None:
-    """Seconds by the first form that every row has; None where there is none."""
+def _read(text: pd.Series, forms: Sequence[str], where: str, zone: str) -> RecordingClock | None:
+    """The clock by the first form that every row has; None where there is none."""
     for form in forms:
         try:
             parsed = pd.to_datetime(text, format=form, utc=True, errors="raise")
         except (ValueError, OverflowError, TypeError):
             continue
         if not parsed.isna().any():
-            return values.seconds(pd.Series(parsed, name=text.name), where)
+            if _ZONED.search(text.iloc[0]):
+                return RecordingClock(values.seconds(parsed, where), "s", ())
+            seconds, remarks = local_seconds(parsed.dt.tz_localize(None), zone, where)
+            return RecordingClock(seconds, "s", remarks)
     return None
 
 

@@ -103,6 +103,7 @@ class TransferImport(TypedDict):
 
     run: str
     unit: str
+    device: Annotated[str | None, "kind of device; null: not stated"]
     points: int
     adequate: Annotated[bool | None, "null: cannot be judged, with `reason`"]
     reason: str
@@ -143,6 +144,7 @@ class WaveformImport(TypedDict):
 
     run: str
     unit: str
+    device: Annotated[str | None, "kind of device; null: not stated"]
     procedure: str
     records: int
     verdict: Annotated[str, "on the model of the test: adequate, not adequate, not judged; empty: it has none"]
@@ -185,6 +187,7 @@ class ImportDocument(TypedDict):
     run: str
     source: SourceDocument
     units: list[str]
+    device: Annotated[str | None, "kind of device; null: not stated"]
     out_unit: str
     samples: int
     dwells: int

@@ -55,17 +55,22 @@ def keep_tables(
     return Run(store, run.id)
 
 
-def lot_of_import(units: list[str], dwells: pd.DataFrame | None = None) -> dict[str, Any]:
-    """The lot of an import: its units with their slots where the dwells tell them, and no device."""
+def lot_of_import(units: list[str], dwells: pd.DataFrame | None = None, device: str = "") -> dict[str, Any]:
+    """The lot of an import: its units with their slots where the dwells tell them, and the device where it is stated."""
     slots: dict[str, int] = {}
     if dwells is not None and "slot" in dwells.columns:
         first = dwells.drop_duplicates("unit")
         slots = dict(zip(first["unit"].astype(str), first["slot"].astype(int), strict=True))
-    return {"device": "imported", "units": [{"serial": unit, "slot": slots.get(unit, 0)} for unit in units]}
+    return {"device": device or "imported", "units": [{"serial": unit, "slot": slots.get(unit, 0)} for unit in units]}
 
 
 def keep_table_of_dwells(
-    dwells: pd.DataFrame, history: pd.DataFrame | None, name: str, archive: str | None, source: SourceFile | None = None
+    dwells: pd.DataFrame,
+    history: pd.DataFrame | None,
+    name: str,
+    archive: str | None,
+    source: SourceFile | None = None,
+    device: str = "",
 ) -> Run:
     """The run that holds a table of dwells in the exchange format, complete for a fit (:func:`complete_table`)."""
     tables = {"dwells": dwells} if history is None else {"dwells": dwells, "history": history}
@@ -75,11 +80,12 @@ def keep_table_of_dwells(
     serials = list(dict.fromkeys(dwells["unit"].astype(str)))
     about: dict[str, Any] = {
         "name": f"dwells of {', '.join(serials[:3])}",
-        "lot": lot_of_import(serials, dwells),
+        "lot": lot_of_import(serials, dwells, device),
         "remarks": [],
     }
     about |= {} if source is None else {"source": source.as_dict()}
-    return keep_tables("import", digest.hexdigest(), {"dwells": name}, about, tables, archive)
+    parameters = {"dwells": name} | ({"device": device} if device else {})
+    return keep_tables("import", digest.hexdigest(), parameters, about, tables, archive)
 
 
 def complete_table(dwells: pd.DataFrame, unit: str = "") -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -130,7 +136,7 @@ def keep(
         parameters["references"] = references.model_dump(mode="json")
     about: dict[str, Any] = {
         "name": f"import of {', '.join(data.units[:3])}", "source": source.as_dict(), "mapping": parameters["mapping"],
-        "remarks": list(data.remarks), "lot": lot_of_import(data.units, data.dwells),
+        "remarks": list(data.remarks), "lot": lot_of_import(data.units, data.dwells, how.device),
     }  # fmt: skip
     if judged is not None and judged.effects:
         model = {"effects": list(judged.effects), "formulas": [], "model_name": "", "model_version": 0}

@@ -5,10 +5,12 @@ from __future__ import annotations
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from zoneinfo import available_timezones
 
+import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from inertial.quantities import FORCE_COLUMNS, LARGEST, OUTPUT_COLUMNS, RECORDED, SPREAD_COLUMNS
+from inertial.quantities import FORCE_COLUMNS, LARGEST, OUTPUT_COLUMNS, RECORDED, SLOW_COLUMNS, SPREAD_COLUMNS
 from schemas.bounds import FASTEST_HZ, LONGEST_WAIT_S
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
@@ -87,6 +89,10 @@ class Mapping(BaseModel):
     units: Units
     unit: str = ""
     """Serial number, if the file has no column for it."""
+    device: str = ""
+    """Kind of device of the units; empty: not stated."""
+    zone: str = ""
+    """Zone of stamps of date and time that state none, such as Europe/Berlin; empty: their clock was not changed."""
     rows: Literal["samples", "dwells"] = "samples"
     rate_hz: Annotated[float, Field(gt=0.0, le=FASTEST_HZ)] | None = None
     axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1, max_length=3)] = NEEDED
@@ -142,6 +148,16 @@ class Mapping(BaseModel):
                     f"'{shown(name)}': a name of 1 to {LONGEST_NAME} printable characters is needed; choose another"
                 )
         return columns
+
+    @field_validator("zone")
+    @classmethod
+    def _in_the_database(cls, value: str) -> str:
+        if value and value not in (known := available_timezones()):
+            close = did_you_mean(
+                value, close_matches(value, known) or ("Europe/Berlin, and others of the IANA data base",)
+            )
+            raise ValueError(f"no zone '{shown(value)}'; {close}")
+        return value
 
     @field_validator("axes")
     @classmethod
@@ -232,6 +248,24 @@ def build(content: dict[str, Any], where: str) -> Mapping:
         elif first["type"] == "missing":
             words = "it is needed; add it"
         raise RecipeInvalid(f"{where}: {shown(key)}: {words}", key=key, close=close) from None
+
+
+def of_exchange(table: pd.DataFrame, keys: dict[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """The keys that map a table of dwells in the exchange format, and a remark on columns that a mapping does not read."""
+    named = {"time_s": "time", **dict(zip(OUTPUT_COLUMNS, NEEDED, strict=True))}
+    texts = [name for name in table.columns if name != "unit" and not pd.api.types.is_numeric_dtype(table[name])]
+    unread = [name for name in table.columns if name in (*texts, *SLOW_COLUMNS, *RESERVED - set(named))]
+    columns = {named.get(name, name): name for name in table.columns if name not in unread}
+    units = dict(keys.get("units", {}))
+    if "out_unit" in table.columns:
+        unread.remove("out_unit")
+        stated = ", ".join(map(str, table["out_unit"].unique()))
+        if units.setdefault("output", stated) != stated:
+            raise WrongUse(
+                f"import: --unit-of output={units['output']}, the table's out_unit is {shown(stated)}; correct one of the two"
+            )
+    told = (f"columns that are not read with --references: {', '.join(unread)}",) if unread else ()
+    return {**keys, "columns": columns, "units": units, "rows": "dwells"}, told
 
 
 def from_file(path: Path) -> dict[str, Any]:

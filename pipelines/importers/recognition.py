@@ -206,7 +206,7 @@ def _time(content: Content, guessed: Guesses) -> tuple[Array | None, list[str]]:
     if values.is_moment(column):
         time = values.seconds(column.ffill(), name)
     elif clocks.is_stamps(column):
-        time = clocks.stamps(column.ffill().bfill(), name)
+        time = clocks.stamps(column.ffill().bfill(), name).seconds
     else:
         numbers = measurable(np.asarray(values.as_numbers(column, name), dtype=np.float64))
         unit = guessed.time_unit.meaning

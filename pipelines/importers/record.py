@@ -76,7 +76,7 @@ def imported(
     if mapping.rows == "dwells":
         return _as_dwells(columns, raw * factor, serials, extras, mapping, content, where, remarks)
     clock = seconds(columns, mapping, content, where)
-    breaks, wide = gaps_of(clock.seconds, columns.get("dwell"), breaks, mapping, where)
+    breaks, wide = gaps_of(clock, columns.get("dwell"), breaks, mapping, where)
     if len(set(serials)) > 1:
         raise DataRejected(
             f"{where}: samples of {len(set(serials))} units in one file, one unit is needed; divide the file"
@@ -223,7 +223,8 @@ def _as_dwells(
     count = pd.Series(serials).groupby(serials).cumcount().to_numpy()
     time = count.astype(np.float64)
     if "time" in columns:
-        time = seconds(columns, mapping, content, where, dwells=True).seconds
+        clock = seconds(columns, mapping, content, where, dwells=True)
+        time, remarks = clock.seconds, (*remarks, *clock.remarks)
         backwards(time, serials, where, together=True)  # units may follow one another, or alternate
         time = time - float(time.min())
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]

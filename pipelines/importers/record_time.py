@@ -15,6 +15,7 @@ from inertial.counts import number_of
 from pipelines.importers import clocks, values
 from pipelines.importers.clocks import RecordingClock
 from pipelines.importers.content import Content
+from pipelines.importers.local_time import CHECK_HOUR, local_seconds
 from pipelines.importers.mapping import TIME_UNITS, Mapping
 from pipelines.importers.stretches import Stretches
 from schemas.errors import DataRejected, WrongUse
@@ -84,9 +85,15 @@ def _clock(
 ) -> RecordingClock:
     time = columns.get("time")
     if time is not None and values.is_moment(time):
-        return RecordingClock(values.seconds(time, where), "s", ())
+        local = time.dtype.kind == "M" and not isinstance(time.dtype, pd.DatetimeTZDtype)
+        read, remarks = local_seconds(time, mapping.zone, where) if local else (values.seconds(time, where), ())
+        return RecordingClock(read, "s", remarks)
     if time is not None and clocks.is_stamps(time) and mapping.units.time != "samples":
-        return RecordingClock(clocks.stamps(time, where), "s", ())
+        return clocks.stamps(time, where, mapping.zone)
+    if mapping.zone:
+        raise WrongUse(
+            f"{where}: zone={mapping.zone} is for stamps of date and time, none are mapped as time; leave it out"
+        )
     if time is None or mapping.units.time == "samples":
         if mapping.rate_hz is None:
             raise WrongUse(
@@ -141,7 +148,7 @@ def gap_limit(steps: Array) -> float:
 
 
 def gaps_of(
-    time: Array, labels: pd.Series | None, breaks: Sequence[int], mapping: Mapping, where: str
+    clock: RecordingClock, labels: pd.Series | None, breaks: Sequence[int], mapping: Mapping, where: str
 ) -> tuple[list[int], tuple[str, ...]]:
     """Rows before which samples are missing, with the breaks that were known before; a remark on them.
 
@@ -150,7 +157,7 @@ def gaps_of(
     DataRejected
         There are unknown gaps, and the mapping does not allow them.
     """
-    steps = np.diff(time)
+    steps = np.diff(clock.seconds)
     wide = np.flatnonzero(steps > gap_limit(steps)) + 1
     if labels is not None:  # between two labels nothing needs to be recorded
         names = labels.astype(str).to_numpy(dtype=object)
@@ -162,6 +169,8 @@ def gaps_of(
     gaps = number_of(wide.size, "gap")
     found = f"{gaps} in time longer than {GAP:g} samples, the first before row {first + 1}, the longest {longest:.4g} s"
     if mapping.gaps == "refuse":
+        for remark in (remark for remark in clock.remarks if remark.startswith(CHECK_HOUR)):
+            raise DataRejected(f"{where}: {remark}")
         raise DataRejected(
             f"{where}: {found}; samples without gaps are needed; record again, or add --set gaps=split to use what lies between"
         )

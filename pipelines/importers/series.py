@@ -155,7 +155,7 @@ def _refuse_clock(names: Sequence[str], values: Array, where: str, *, named: boo
 def _seconds(table: pd.DataFrame, name: str, unit: str, where: str) -> Array:
     """Times (n,) of a column, s: of numbers in a unit, or of dates."""
     if name in table.columns and clocks.is_stamps(table[name]):
-        return clocks.stamps(table[name], where)
+        return clocks.stamps(table[name], where).seconds
     return TIME_UNITS[unit] * finite_column(table, name, where)
 
 

@@ -30,6 +30,7 @@ def import_transfer(
     effects: Sequence[str] = ("second_order", "delay"),
     archive: str | None = None,
     layout: PointsLayout | None = None,
+    device: str = "",
 ) -> TransferImport:
     """The diagnosis of a transfer function in a file; points, findings and source are stored as a run of the archive.
 
@@ -72,12 +73,18 @@ def import_transfer(
     stated = {"procedure": "sweep", "effects": list(effects), "unit": unit}
     if layout is not None:
         stated |= {name: dict(value) for name, value in vars(layout).items() if value}
-    about = {"name": f"transfer function of {unit}", "source": source.as_dict(), "lot": lot_of_import([unit])}
+    stated |= {"device": device} if device else {}
+    about = {
+        "name": f"transfer function of {unit}",
+        "source": source.as_dict(),
+        "lot": lot_of_import([unit], device=device),
+    }
     tables = _tables(points, unit, text)
     run = keep_tables("import of a transfer function", source.sha256, stated, about, tables, archive)
     return {
         "run": run.id,
         "unit": unit,
+        "device": device or None,
         "points": len(points.value),
         "adequate": diagnosis.adequate,
         "reason": diagnosis.reason,

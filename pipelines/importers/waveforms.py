@@ -61,6 +61,7 @@ def import_waveforms(
     unit: str,
     layout: RecordingLayout,
     archive: str | None = None,
+    device: str = "",
 ) -> WaveformImport:
     """Figures and findings of a procedure from the recordings of one unit, one file a record; stored as a run of the archive.
 
@@ -105,12 +106,12 @@ def import_waveforms(
         }
         samples = {unit: made.samples} | ({} if made.reference is None else {REFERENCE: made.reference})
         records.append(ProcedureRecord(number, step, pd.DataFrame([reading]), samples))
-    device = Device({}, {}, full_scale, out_unit)
+    sensor = Device({}, {}, full_scale, out_unit)
     try:
-        points = test.reduce(stated, records, device)
+        points = test.reduce(stated, records, sensor)
         mapped = [axis for axis in AXES if axis in layout.columns]
         points = points[points["axis"].isin(mapped)].reset_index(drop=True)
-        outcome = test.evaluate(stated, points, device)
+        outcome = test.evaluate(stated, points, sensor)
         verdict = test.verdict(stated, points)
     except InertialError as problem:
         raise DataRejected(f"{paths[0].name}: {problem}") from None
@@ -127,12 +128,13 @@ def import_waveforms(
         "name": f"{test.title} of {unit}, recorded elsewhere",
         "source": sources[0].as_dict(),
         "sources": [source.as_dict() for source in sources],
-        "lot": lot_of_import([unit]),
+        "lot": lot_of_import([unit], device=device),
     }
     parameters = {
         "procedure": procedure, "unit": unit, "part": content, "columns": dict(layout.columns), "units": dict(layout.units),
         "rate_hz": layout.rate_hz, "group": layout.group,
     }  # fmt: skip
+    parameters |= {"device": device} if device else {}
     outcome = Outcome({unit: values}, [Finding(unit, *text) for text in texts])
     tables = procedure_tables([(0, procedure, points, outcome)])
     run = keep_tables("import of waveforms", digest_of(sources), parameters, about, tables, archive)
@@ -148,6 +150,7 @@ def import_waveforms(
     return {
         "run": run.id,
         "unit": unit,
+        "device": device or None,
         "procedure": procedure,
         "records": len(records),
         "verdict": verdict,

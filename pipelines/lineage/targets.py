@@ -66,7 +66,7 @@ def lineage(archive: Archive, target: str) -> Lineage:
         names = [name for name in graph.nodes if name in {f"runs/{run}/grades.parquet" for run in runs}]
         return traced("unit", names or [f"runs/{run}" for run in runs])
     message = f"lineage: '{target}' is neither a unit, a certificate, a run nor a file of archive {archive.root}"
-    message += f"; {did_you_mean(target, ids)}"
+    message += f"; {archive.units_like(target, ids) or did_you_mean(target, ids)}"
     raise WrongUse(message if ids else f"archive {archive.root}: no run exists; make one with 'tumbleline run'")
 
 

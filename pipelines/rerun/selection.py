@@ -6,7 +6,7 @@ from datetime import UTC, date, datetime, time
 from typing import Any
 
 from pipelines.archive import Archive, files
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import WrongUse, close_matches, did_you_mean
 
 KEYS = ("device", "station", "unit", "recipe", "since", "until")
 ALL, LATEST = "all", "latest"
@@ -131,10 +131,13 @@ def _holds(entry: SelectedRun, key: str, value: Any) -> bool:
 def _there_is(chosen: list[SelectedRun], filters: list[tuple[str, Any]]) -> str:
     """The values of the runs for the keys of a filter that no run matches."""
     texts: list[str] = []
-    for key, _ in filters:
+    for key, value in filters:
         if key in {"since", "until"}:
             texts.append(f"measured {chosen[0].measured:%Y-%m-%d} to {chosen[-1].measured:%Y-%m-%d};")
-        elif key != "unit":
+        elif key == "unit":
+            close = close_matches(str(value), {unit for entry in chosen for unit in entry.units})
+            texts += [f"{did_you_mean(str(value), close)}"] if close else []
+        else:
             names = sorted({str(getattr(entry, key)) for entry in chosen})
             texts.append(f"{key}: {', '.join(names[:5])}{' …' if len(names) > 5 else ''};")
     return " ".join(dict.fromkeys(texts))

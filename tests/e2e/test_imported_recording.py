@@ -103,7 +103,8 @@ def table(run: str, name: str) -> pd.DataFrame:
 
 def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate() -> None:
     first = imported(DRIFTING, 71, "--fit", "norm", status=1)
-    fresh = imported(DRIFTING, 72)
+    fresh = imported(DRIFTING, 72, "--device", "adxl357")
+    assert "device: adxl357 is not one that the program knows; did you mean ADXL355?" in str(fresh["remarks"])
     assert first["adequate"] is False
     assert document_of("diagnose", first["run"])["recommended"] == ["warm_up"]
     text_of("extend", "model.toml", "warm_up", "--effects", PLAIN, status=0)
@@ -225,7 +226,13 @@ def test_an_import_that_was_not_fitted_is_advised_and_a_fit_that_fails_leaves_no
 
 
 def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
-    first = document_of(*hand_held(*STATED, "--fit", "norm"))
+    make(Recording(48, "white 280, B 30"), 4714).dwells.assign(unit="H1", pose="by hand").to_csv(
+        "table.csv", index=False
+    )
+    words = ("--unit-of", "output=LSB", *STATED, "--fit", "norm", "--device", "adxl355")
+    first = document_of("import", "table.csv", *words)  # in the exchange format
+    assert "columns that are not read with --references: pose" in first["remarks"]
+    assert (first["device"], "device: " in str(first["remarks"])) == ("ADXL355", False)
     assert any(remark.startswith("held out for verification: H1: ") for remark in first["remarks"])
     fitted = document_of("fit", first["run"], "--limits", "limits.toml")
     assert fitted["units"][0]["outcome"] == "pass", fitted
@@ -242,8 +249,8 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
     assert not {("misalignment", axis) for axis in ("yx", "zx", "zy")} & set(sums.index)
     text_of("show", fitted["run"], "--report", status=0)
     (certified,) = document_of("certificate", "issue", fitted["run"])["certified"]
-    assert (certified["certificate"], certified["station"]) == ("H1/1", "lab-2")
-    audited = text_of("audit")
+    assert (certified["certificate"], certified["station"], certified["device"]) == ("H1/1", "lab-2", "ADXL355")
+    audited = text_of("audit", "--device", "ADXL355")
     assert "1 calibration, 1 unit, 1 run, 1 station" in audited
     assert "ledger 1 certificate; 1 of 1 units" in audited
     page = Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")

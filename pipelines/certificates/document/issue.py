@@ -128,7 +128,7 @@ def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibrat
         elif number or any(name in info.units for info in archive.runs()):
             raise WrongUse(f"certificate: unit {serial} has no certificate, one is needed; {_why(archive, serial)}")
         else:
-            chosen |= _of_run(ledger, archive.run(name), done)
+            chosen |= _of_run(ledger, archive.run(name, or_unit=True), done)
     return list(chosen.values()), done
 
 
@@ -183,4 +183,4 @@ def _why(archive: Archive, serial: str) -> str:
             return f"run {run.id}: {reason}"
         if reason is not None:
             return f"it passed: certify it with 'tumbleline certificate issue {run.id}' first"
-    return "see 'tumbleline list'"
+    return archive.units_like(serial) or "see 'tumbleline list'"

@@ -99,7 +99,7 @@ FIGURES = (
         name="verification_norm_ug",
         unit="µg",
         meaning="Largest error of |a|, the magnitude of gravity (of a device with fewer axes, along them), in a pose not used by "
-        "the fit, mean over the dwells of the pose.",
+        "the fit, mean over the dwells of the pose; of its worst soak where its error is not the same at all temperatures.",
         label="largest error of |a| in a pose not used, mean of its dwells",
         order=20,
         value=_norm,

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from in_process import document_of, refused
 from in_process import given as asked
+from laboratory import LABORATORY
 from ledger_events import day, event
 
 from pipelines.archive import Run
@@ -163,7 +164,11 @@ def test_a_day_is_that_of_utc_and_months_end_on_the_last_day_where_there_is_no_s
     assert months_after("2026-01-15", 12) == "2027-01-15"
 
 
-def test_units_that_passed_are_certified_and_show_tells_the_calibration_of_a_date_with_origin_and_end(run: Run) -> None:
+def test_units_that_passed_are_certified_and_show_tells_the_calibration_of_a_date_with_origin_and_end(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("lab.toml").write_text(LABORATORY, encoding="utf-8")
     own = ("--archive", run.archive.root)
     document = document_of("certificate", "issue", run.id, *own, status=1)
     assert {one["serial"] for one in document["certified"]} == {"A1", "A2"}
@@ -184,12 +189,26 @@ def test_units_that_passed_are_certified_and_show_tells_the_calibration_of_a_dat
     last = document_of("show", "A2", "--at", day(100), *own, status=1)["history"][-1]
     assert (last["state"], last["ended"]["reason"]) == ("revoked", "returned damaged")
     assert "unit 'B7' has no calibration in archive" in refused("show", "B7", "--at", "2026-01-01", *own)
+    write = "--laboratory lab.toml"
+    for words in (
+        "show A22", "show A22 --at 2026-01-01", "certificate revoke A22 --reason x", f"certificate write A22 {write}",
+        f"certificate write A22/1 {write}", "certificate list A22", "certificate issue latest --units A22", "lineage A22",
+        "export latest --units A22", "rerun unit:A22",
+    ):  # fmt: skip
+        assert "did you mean A2" in refused(*words.split(), *own), words
+    Path("units.csv").write_text("serial,wafer\nA22,W1\n", encoding="utf-8")
+    assert document_of("attributes", "add", "units.csv", *own)["similar"]["A22"][0] == "A2"
 
 
-def test_the_bare_command_given_again_later_amends_nothing(ledger: Ledger) -> None:
+def test_the_bare_command_given_again_amends_nothing_and_a_reason_of_the_same_day_does(ledger: Ledger) -> None:
     later = event(start="2026-03-01", until="2027-03-01")
     assert ledger.add(later, amend=False) == (ledger.events("A1")[0], True)
     assert len(ledger.events("A1")) == 1
     _, was_there = ledger.add(replace(later, covers="sweep", start="2026-03-02"), amend=False)
     assert not was_there  # another kind of calibration
+    amended, _ = ledger.add(event(reason="the grade was misread"))
+    assert ledger.add(event(reason="the grade was misread ")) == (amended, True)
+    assert ledger.add(event()) == (amended, True)
+    assert (amended.action, amended.ends, amended.reason) == ("supersede", (1,), "the grade was misread")
+    assert ledger.valid_at("A1", "2026-01-01").event == amended
     assert ledger.add(later)[0].action == "supersede"

@@ -176,7 +176,11 @@ def test_a_certificate_is_offered_where_it_would_be_given(
     for serial in ("A1", "A2"):
         typed("certificate", "revoke", serial, "--reason", "dropped")
     assert offered(ledger, run)  # A3 is left
-    typed("certificate", "revoke", "A3", "--reason", "dropped")
+    typed("certificate", "issue", run.id, "--units", "A3", "--since", day(1))
+    ended = ("certificate", "revoke", "A3", "1", "--reason", "dropped")
+    told = " ".join(typed(*ended).stdout.split())
+    assert "A3/2, of the same measurements, stays valid; 'tumbleline certificate revoke A3 2 --reason dropped -" in told
+    assert json.loads(typed("certificate", "revoke", "A3", "--reason", "dropped", "--json").stdout)["still_valid"] == []
     assert not offered(ledger, run)
 
     def refused(_run: Run) -> str:

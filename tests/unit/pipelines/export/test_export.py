@@ -37,7 +37,7 @@ from schemas.errors import WrongUse
 def test_refuses_a_unit_that_is_not_there_an_effect_without_a_place_and_noise_without_a_static_record(
     run: Run, tmp_path: Path
 ) -> None:
-    with pytest.raises(WrongUse, match="no unit B7 in this run; there are A1, A2, A3"):
+    with pytest.raises(WrongUse, match="no unit B7 in this run; known: A1, A2, A3"):
         unit_calibrations(run, ("B7",), failed=False)
     bent = small_run(tmp_path, None, ('"scale_temperature"]', '"scale_temperature", "second_order"]'))
     units = unit_calibrations(bent, (), failed=True)

@@ -55,6 +55,38 @@ def test_the_unit_that_a_file_states_for_the_time_of_its_dwells_counts(rng: np.r
     np.testing.assert_allclose(dwells["time_s"], 60.0 * np.arange(12))
 
 
+@each({"2026-03-29 00:55": "forward", "2026-10-25 00:30": "back", "2026-10-28 00:30": ""}.items())
+def test_local_times_over_a_change_of_the_clock_are_told_and_right_where_the_zone_is_stated(
+    clock: tuple[str, str], rng: np.random.Generator
+) -> None:
+    start, jump = clock
+    moments = pd.date_range(start, periods=90, freq="60s", tz="UTC").tz_convert("Europe/Berlin")
+    stamps = moments.strftime("%d.%m.%Y %H:%M:%S")
+    out = rng.normal(size=(90, 3))
+    frame = pd.DataFrame(out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
+    columns = {"time": "when", "x": "ax", "y": "ay", "z": "az"}
+    content = {**CONTENT, "columns": columns, "rows": "dwells"}
+    for when in (stamps, moments.tz_localize(None)):
+        told = f"the times jump {jump} by an hour before row"
+        try:
+            remarks = imported(frame.assign(when=when), build(content, "t"), "f.csv").remarks
+        except DataRejected as refused:
+            assert jump == "back"
+            remarks = (str(refused),)
+        assert [told in remark and "--set zone=NAME, for instance Europe/Berlin" in remark for remark in remarks] == (
+            [True] if jump else []
+        )
+        right = imported(frame.assign(when=when), build({**content, "zone": "Europe/Berlin"}, "t"), "f.csv")
+        assert right.remarks == ()
+        np.testing.assert_allclose(right.dwells["time_s"], 60.0 * np.arange(90))
+    if jump == "forward":
+        frame["when"] = moments.tz_convert("UTC").tz_localize(None) + pd.Timedelta("1h")
+        with pytest.raises(DataRejected, match=r"row 6: 2026-03-29 02:00:00 does not exist in Europe/Berlin"):
+            imported(frame, build({**content, "zone": "Europe/Berlin"}, "t"), "f.csv")
+    with pytest.raises(RecipeInvalid, match=r"zone: no zone 'Europe/Berln'; did you mean Europe/Berlin"):
+        build({**content, "zone": "Europe/Berln"}, "t")
+
+
 def test_one_pose_is_judged_by_bias_and_its_temperature(rng: np.random.Generator) -> None:
     table = lots.lot(rng, units=1)
     assert default_model(table)[:3] == ["bias", "scale", "misalignment"]

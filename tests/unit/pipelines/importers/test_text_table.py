@@ -136,7 +136,7 @@ def test_three_decimals_are_no_thousands(rows: list[list[float]], decimal: str, 
 
 
 def test_minutes_and_seconds_of_a_spreadsheet_go_on_over_the_hour() -> None:
-    times = stamps(pd.Series(["59:59,50", "59:59,75", "00:00,00", "00:00,25"], name="t"), "a.csv")
+    times = stamps(pd.Series(["59:59,50", "59:59,75", "00:00,00", "00:00,25"], name="t"), "a.csv").seconds
     np.testing.assert_allclose(times, [0.0, 0.25, 0.5, 0.75])
 
 

@@ -107,9 +107,10 @@ def test_a_bad_dwell_of_one_unit_is_left_out_of_it_alone(tmp_path: Path) -> None
     dwells.loc[(dwells["unit"] == "B") & (dwells["dwell"] == 7), "out_y"] += 0.004
     path = tmp_path / "lot.csv"
     dwells.to_csv(path, index=False)
-    done = import_document([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    done = import_document([path], {"device": "MY-1"}, "", "", str(tmp_path / "archive"), None, nullcontext)
     archive = Archive(str(tmp_path / "archive"))
     whole = again(archive, done["run"], ModelChange())
+    assert {archive.run(run).about["lot"]["device"] for run in (done["run"], whole.new)} == {done["device"]} == {"MY-1"}
     without = again(archive, done["run"], ModelChange(), left_out=(("B", 7),))
     bias = [
         run.table("coefficients").query("unit == 'B' and axis == 'y' and effect == 'bias'")["value"].item()
@@ -202,7 +203,7 @@ def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
 def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None:
     path = tmp_path / "lot.csv"
     table(np.random.default_rng(8)).assign(slot=3).to_csv(path, index=False)
-    with pytest.raises(WrongUse, match=r"takes --unit-of output=… alone \(found local_gravity_m_s2\)"):
+    with pytest.raises(WrongUse, match=r"takes --unit-of output=… and --device alone \(found local_gravity_m_s2\)"):
         import_document([path], {"local_gravity_m_s2": 9.8}, "", "", str(tmp_path / "archive"), None, nullcontext)
     done = import_document([path], {"units": {"output": "mg"}}, "", "", str(tmp_path / "archive"), None, nullcontext)
     run = Archive(str(tmp_path / "archive")).run(done["run"])

@@ -74,7 +74,15 @@ def test_a_lag_is_found_with_its_error_and_verified_by_what_came_before_each_dwe
     assert abs(tau["value"] - TAU) < 5.0 * tau["standard_error"] + 2.0
     np.testing.assert_allclose(rows[rows["name"] == "kL"]["value"], LAGGING, rtol=0.1)
     tables = [fitted[name] for name in ("coefficients", "covariance", "predictions")]
-    verified = verify(dwells, history, *tables)["verification"]
+    verified, means = (verify(dwells, history, *tables)[name] for name in ("verification", "verification_poses"))
+    assert set(means["dwells"]) == {4}  # one in each soak, of one error
+    changed = dwells.copy()
+    hot = np.where((dwells["unit"] == "U0") & (dwells["pose"] == "p24"), np.sign(dwells["unit_C"] - 30.0), 0.0)
+    for axis in "xyz":
+        changed[f"out_{axis}"] += 20.0 * WHITE * hot * dwells[f"force_{axis}"]
+    means = verify(changed, history, *tables)["verification_poses"].set_index(["unit", "pose"])
+    assert means.query("dwells < 4").index.tolist() == [("U0", "p24")]  # its errors at the soaks are no mean of zero
+    assert abs(means.loc[("U0", "p24"), "error_ug"]) > 15e6 * WHITE
     assert 0.8 < np.std(verified["error_ug"] / verified["uncertainty_ug"]) < 1.25
     assert verified["error_ug"].abs().max() < 5.0 * 1e6 * WHITE
     # a time constant for each axis is read as it was written
