@@ -33,7 +33,7 @@ _JUMPS = 4
 class Jumps:
     """Jumps of single axes in place of an effect.
 
-    terms : those of the axis of the largest gain first; ahead : their score, together, less that of the effect
+    terms : all jumps, those of the axis with the largest gain first; ahead : their total score less that of the effect
     """
 
     terms: tuple[Term, ...]
