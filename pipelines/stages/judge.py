@@ -1,4 +1,4 @@
-"""The verdict on the model of a run: whether it is adequate, with residual, noise and probability; one row of the archive."""
+"""The verdict on the model of a run: whether it is adequate, with residual, noise and probability; a table with one row."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
@@ -35,12 +35,12 @@ class AdequacyDocument(TypedDict):
 
 
 def judge(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
-    """The table ``verdict`` of a run; without rows where it has no model, as without a multi-position test."""
+    """The table ``verdict`` of a run; without rows if the run has no model, as without a multi-position test."""
     return {"verdict": verdict_table(verdict_on(dwells, history, effects) if effects else None, effects)}
 
 
 def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> AdequacyDocument:
-    """The verdict of a diagnosis on a model, without classes and proposals; the reason where data or an effect are not usable."""
+    """The verdict of a diagnosis on a model, without classes and proposals; or the reason why it cannot be judged."""
     if dwells.empty:
         return _not_judged("every unit was refused, so that no dwell is left; see the reasons of each unit")
     from inertial.criticism.verdict import judged  # loads the search for effects: a run without dwells does not need it
@@ -62,7 +62,7 @@ def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequ
 
 
 def told_by(diagnosis: Mapping[str, Any], units: int) -> AdequacyDocument:
-    """The verdict that a diagnosis of the same dwells of some units, and of the same model, has told."""
+    """The verdict from the document of a diagnosis of the same dwells and model; ``units``: number of units diagnosed."""
     faulty = sorted({unit for fault in diagnosis["blocked_by"] for unit in fault["units"]})
     adequate, error = diagnosis["adequate"], diagnosis["error"]
     named = bool(diagnosis["classes"] or diagnosis["unexplained"])
