@@ -166,10 +166,7 @@ def size_where_it_acts(model: Model, term: Term) -> float:
 
 
 def contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
-    """Rivals, best first: the best candidates at the model's noise, at less wander and at none, each then at its own noise.
-
-    barred : id that is left out; finalists : number of candidates at each noise
-    """
+    """Rivals, best first: the best candidates at the model's noise, at less wander and at none, each then at its own noise."""
     leave = {*(t.effect.id for t in model.terms if not isinstance(t.effect, Handling)), barred}
     chosen: dict[str, Term] = {}
     noise = model.noise

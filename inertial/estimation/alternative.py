@@ -63,10 +63,7 @@ class Handling(Effect):
         """Columns of the affected units, (units or 1, n, 3, k), g per unit of the coefficient."""
 
     def of_each_unit(self, lot: "Lot", slope: Array | None, **location: float) -> Array:
-        """Columns (units or 1, n, 3, k), g per unit of the coefficient, with each unit in turn as the affected one.
-
-        ``location`` has no ``unit``; the first dimension is 1 where the columns are equal for all units.
-        """
+        """Columns (units or 1, n, 3, k), g, with each unit in turn as the affected one; ``location`` has no ``unit``."""
         units = range(lot.state.time.shape[0])
         return np.concatenate([self.change(lot, slope, unit=float(unit), **location) for unit in units])
 

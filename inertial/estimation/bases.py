@@ -5,10 +5,7 @@ import numpy as np
 from inertial.arrays import Array, Places
 
 SEEN = 0.01
-"""Norm of a column after projection on the base model, over its norm before, below which it counts as not visible.
-
-Noise of the recorded drivers leaves as much of a column that the model contains.
-"""
+"""Norm of a column beyond the base model, over its norm, below which it is not visible: noise of the drivers leaves as much."""
 
 _LEFT = 1e-8
 """Share of a target's sum of squares that remains by rounding where a projection removes all of it."""

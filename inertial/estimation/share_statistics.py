@@ -87,9 +87,9 @@ class ShareStatistics:
     def _determined(self) -> Array:
         """Linearly independent columns (blocks, n, r) with the span of the local ones; the local ones where ranks differ.
 
-        In a norm only three of six misalignment columns are visible, and rotation about one axis shows two of three forces. A
-        combination of zero, counted in the information, would lower the deviance by ln F for a share F of wander, so that the
-        largest share would always be best.
+        In a norm only three of six misalignment columns are visible, and rotation about one axis shows two of three forces.
+        Counted in the information, a zero combination would lower the deviance by ln F for a share F of wander: the largest
+        share would always be best.
         """
         there = self.problem.covariance.there.astype(np.float64)
         products = np.swapaxes(self._local, -1, -2) @ (self._local * there[..., None])

@@ -19,8 +19,7 @@ def slow_deviation(dwells: Sequence[Array]) -> Array:
 
     The mean is the spectral line at zero frequency. The lines next to it have the same noise density, and the same leakage from
     a vibration at much higher frequency. The scatter of the samples shows neither: the vibration of an engine averages out, the
-    breath of a person wearing the sensor does not. The few lines of a dwell are shrunk towards those of the others as far as the
-    dwells agree.
+    breath of a wearer does not. The few lines of a dwell are shrunk towards those of the others as far as the dwells agree.
 
     Parameters
     ----------

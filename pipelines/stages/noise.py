@@ -65,11 +65,7 @@ TERM_COLUMNS = ["unit", "axis", "term", "value", "low", "high", "identified", "u
 
 @dataclass(frozen=True)
 class StaticChannel:
-    """The record of one axis of one unit.
-
-    record : (n,), µg, without the response to temperature; digits : resolution; warmth : remark on the temperature
-    silent : reason why the channel has no noise figures, else empty
-    """
+    """The record (n,), µg, of one axis of one unit without its temperature response; ``silent``: why it has no noise figures."""
 
     unit: str
     axis: str
