@@ -88,7 +88,7 @@ LEAST = 1e-4
 
 
 def probability(value: float) -> str:
-    """A probability in percent as text, with the smallest one as a lower bound."""
+    """A probability in percent as text; "< 0.01 %" below :data:`LEAST`."""
     return "< 0.01 %" if value < LEAST else f"{100.0 * value:.2g} %"
 
 
