@@ -1,4 +1,4 @@
-"""Opening a station: links, profiles and adapters put together; here alone simulation is told from hardware."""
+"""Opening a station from its links, profiles and adapters; the only module that distinguishes simulation from hardware."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def open_station(
 ) -> Generator[Station]:
     """A station ready to be driven; closed when the context ends.
 
-    Hardware is leased and watched meanwhile, and left in its safe state, whatever ends the context.
+    Hardware is leased and supervised by a watchdog during the context, and left in its safe state however the context ends.
 
-    config : what the station is
-    lot : the units in it; a simulated station makes their devices
-    resume : ``Station.state()`` of an earlier session: a simulated station goes on exactly there; hardware is where it is
+    config : the station's file
+    lot : the units in it; a simulated station simulates these devices
+    resume : ``Station.state()`` of an earlier session, in which a simulated station continues; hardware keeps its present state
     hidden : physics beyond the station's file, for simulated stations
-    run : purpose of the leases, as messages to other runs state it
+    run : purpose of the leases, for messages to other runs
     roles : equipment that the run needs besides table, chamber and reader
     """
     held = active_replay()
@@ -77,7 +77,7 @@ def open_station(
         try:
             yield station
         except StationError:
-            protection.leases.require()  # what a run finds at a station that it has lost is not why it ends
+            protection.leases.require()  # if the leases are lost, that is the reason to report, not the error it caused
             raise
         finally:
             protection.leave(station.make_safe)
@@ -91,7 +91,7 @@ def open_devices(
     protection: Protection | None = None,
     roles: Sequence[str] = (),
 ) -> Generator[Station]:
-    """The devices of a station of hardware; without ``protection`` to look at them, or to make them safe."""
+    """The devices of a hardware station; without ``protection`` only for reading their state or making them safe."""
     permit, require = None, nobody_else
     if protection is not None:
         permit = Permit(protection.leases.alive, protection.leases.require, config.link.timeout_s)
@@ -104,7 +104,7 @@ def open_devices(
 def make_plant(
     config: StationConfig, lot: Lot, resume: bytes | None = None, hidden: Sequence[HiddenEffect] = ()
 ) -> Plant:
-    """The plant of a simulated station, taken to where ``resume`` says."""
+    """The plant of a simulated station, in the state ``resume`` if one is given."""
     from stations.plant.plant import Plant  # noqa: PLC0415 - hardware needs no plant
 
     plant = Plant(config, lot, hidden)
@@ -115,7 +115,7 @@ def make_plant(
 
 @contextmanager
 def serve_plant(config: StationConfig, lot: Lot, plant: Plant, roles: Sequence[str] = ()) -> Generator[Station]:
-    """A station whose devices are the plant's, on loopback; ``lot`` is what its client expects to find."""
+    """A station whose devices are those of a plant, served on loopback; ``lot``: the units that the client expects."""
     from stations.plant.plant import PlantClock  # noqa: PLC0415 - hardware needs no plant
 
     with serve_devices(config, plant, roles) as links:
@@ -148,7 +148,7 @@ def serve_devices(config: StationConfig, plant: Plant, roles: Sequence[str] = ()
 def _assemble(
     config: StationConfig, slots: Sequence[int], links: Links, clock: Clock, roles: Sequence[str] = ()
 ) -> Station:
-    """The station's adapters on their links, each with the tighter of its profile's and the station's limits."""
+    """The station's adapters on their links, each with the intersection of its profile's and the station's limits."""
     if links.recorder is not None:
         clock = RecordedClock(clock, links.recorder)
     devices, limits = config.devices, config.limits
@@ -195,7 +195,7 @@ def _registers(name: str, key: str, device: Device, links: Links) -> Registers:
 def _axis(
     which: Literal["outer", "inner"], registers: Registers, bounds: tuple[float, float], limits: Limits
 ) -> TableAxis:
-    """An axis by its drive's family, that keeps within the drive's limits and the station's."""
+    """The adapter of an axis, limited by the drive's profile and the station's file."""
     profile = registers.profile
     speed, acceleration = (
         tighter((0.0, wanted), profile, name if profile.has(name) else f"{which}_{name}")[1]
@@ -206,7 +206,7 @@ def _axis(
 
 
 def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[float, float]:
-    """The bounds that both the station's file and a value of the profile allow."""
+    """The intersection of the station's bounds with those of a value in the profile."""
     if not profile.has(name):
         return bounds
     entry = profile.entry(name)
@@ -223,26 +223,26 @@ def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[f
 
 @contextmanager
 def one_processor() -> Generator[None]:
-    """A block whose thread, and those that it starts, stay on a processor that no other such block of the user has.
+    """A block whose thread, and threads that it starts, are pinned to a processor that no other such block of the user has.
 
-    Nothing changes where no processor is free, or where the system cannot tie a thread to one.
+    Nothing is pinned if no processor is free, or if the system does not support it.
     """
     with ExitStack() as stack:
         number = _claimed(stack)
         if number is not None:
-            stack.callback(_tie, *os.sched_getaffinity(0))
-            _tie(number)
+            stack.callback(_pin, *os.sched_getaffinity(0))
+            _pin(number)
         yield
 
 
-def _tie(*numbers: int) -> None:
-    """Let this thread run on some processors; it stays where it is when they are no longer its own (a changed cpuset)."""
+def _pin(*numbers: int) -> None:
+    """Pin this thread to some processors; without effect if they are no longer allowed (a changed cpuset)."""
     with suppress(OSError):
         os.sched_setaffinity(0, numbers)
 
 
 def _claimed(stack: ExitStack) -> int | None:
-    """A processor that is claimed until the stack is left, also by a kill; None where all have been or there is but one."""
+    """A processor claimed until the stack is left or the process is killed; None if all are claimed or there is only one."""
     if not hasattr(os, "sched_setaffinity") or len(allowed := os.sched_getaffinity(0)) < 2:
         return None
     for number in sorted(allowed):

@@ -56,9 +56,9 @@ class Overview:
 
 @contextmanager
 def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overview]]:
-    """A block with a function that reads the state of the station at each call; nothing moves, and no lease is needed.
+    """A block with a function that reads the state of the station at each call, without any motion or lease.
 
-    lot : the units in a simulated station; hardware reports its own
+    lot : the units in a simulated station; hardware reports its units
     """
     from stations.opening import make_plant, open_devices, serve_plant  # noqa: PLC0415 - imported only when the state is read
 
@@ -67,7 +67,7 @@ def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overvie
             yield lambda: look_at(config, station)
         return
     slots: list[int] = []
-    # that the reader does not answer is shown by the state
+    # a reader that does not answer is reported in the state
     with open_devices(config, ()) as empty, suppress(StationError):
         slots = empty.reader.occupied()
     with open_devices(config, slots) as station:
@@ -128,9 +128,9 @@ def _lease(now: Overview, station: Station) -> None:
 
 
 def unsafe_reason(folder: Path, config: StationConfig) -> str:
-    """Why the station does not count as safe; empty where it is safe, or a live run drives it.
+    """The reason why the station does not count as safe; empty if it is safe, or if a live run drives it.
 
-    A first finding is checked again: a lease that is being taken or released has a lock and no note for a moment.
+    A first finding is checked again, because a lease that is being taken or released has a lock and no note for a moment.
     """
     if _reason(folder, config):
         time.sleep(AGAIN_S)

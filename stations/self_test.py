@@ -16,12 +16,12 @@ from schemas.errors import StationError
 from schemas.safety import SelfTest
 from stations.station import Station
 
-WILD = 0.05  # of full scale; the noise of a device at rest is always lower
-NOISIER = 3.0  # times the median noise of the slots; needs at least so many slots:
+WILD = 0.05  # largest noise over full scale; a device at rest always has less
+NOISIER = 3.0  # largest noise over the median of the slots, for at least this number of slots:
 FEWEST_TO_COMPARE = 3
-KEPT = 0.99  # of the samples expected between start and stop, by the clock of the reader
-STANDS = 0.5  # of the requested seconds; a clock that shows less has stopped, or is not that of the reader
-RUNS_S = 10.0  # beyond them; a clock that shows more is not that of this station, or is served at another [link] speed
+KEPT = 0.99  # smallest share of the samples expected between start and stop by the clock of the reader
+STANDS = 0.5  # smallest elapsed over requested time; a clock that shows less has stopped, or is not that of the reader
+RUNS_S = 10.0  # largest excess over the requested time; a clock that shows more is another, or has another [link] speed
 SIGMAS = 3.0
 MOVING_RANGE = 1.128  # mean range of two over sigma, normal: NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2
 UP, DOWN = (0.0, 0.0), (180.0, 0.0)

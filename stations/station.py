@@ -26,16 +26,16 @@ class Unsettled(NotReached):
 
 
 def nobody_else() -> None:
-    """For a station in this process, which no other run can drive."""
+    """``Station.require`` of a simulated station in this process, which no other run can drive."""
 
 
 @dataclass(frozen=True)
 class Station:
-    """Everything that a capture drives.
+    """The clock and devices of a station, as driven by a capture.
 
-    ``state()`` is what it is resumed from. ``exact`` says that a resumed station stands where it stood, to the bit; any
-    other may have been anywhere since, so that its temperature is settled anew. ``require()`` refuses when another has
-    taken the station over. ``safe_steps`` lead to the safe state. ``equipment`` are the adapters of the roles that a run needs.
+    ``state()`` gives the state from which it can be resumed. ``exact``: a resumed station is in exactly the earlier state; any
+    other may have changed, and the devices are soaked again. ``require()`` refuses if another run has taken over the station.
+    ``safe_steps`` are the commands towards the safe state. ``equipment`` has the adapters of the roles that a run needs.
     """
 
     config: StationConfig
@@ -55,14 +55,14 @@ class Station:
         return self.config.name
 
     def make_safe(self, patience_s: float = 0.0) -> Reached:
-        """Puts the station into its safe state and tells what was reached."""
+        """Puts the station into its safe state; returns the commands that succeeded and failed."""
         return reach_safe_state(self.safe_steps, patience_s=patience_s)
 
     def soak(self, target: float, shortest: float, slots: Sequence[int], observe: Observe) -> float:
-        """Takes the devices to ``target`` °C and gives the seconds it took until they had settled.
+        """Soaks the devices at ``target`` °C and returns the time in seconds until they have settled.
 
-        Settled: every device inside the band around the target and changing slower than the rate over the window, and
-        ``shortest`` seconds gone. ``observe`` gives the temperatures by slot and may note them; what it raises ends the soak.
+        Settled: every device is within the band around the target and changes more slowly than the rate over the window, after
+        at least ``shortest`` seconds. ``observe`` returns the temperatures by slot and may record them; its errors end the soak.
         """
         limits, clock = self.config.soak, self.clock
         self.chamber.set_temperature(target)
@@ -88,7 +88,7 @@ class Station:
         return all(self._still([row[k] for _, row in past], target, span) for k in range(len(past[0][1])))
 
     def _still(self, temperatures: list[float], target: float, span: float) -> bool:
-        """Whether one device has settled over a window of ``span`` seconds; one whose temperature is unknown has not."""
+        """Whether one device has settled over a window of ``span`` seconds; false if a temperature is unknown."""
         limits = self.config.soak
         if not all(abs(t - target) <= limits.band_K for t in temperatures):
             return False
@@ -99,7 +99,7 @@ class Station:
     def _unsettled(
         self, past: deque[tuple[float, list[float]]], target: float, slots: Sequence[int], seconds: float
     ) -> Unsettled:
-        """The refusal that names the slots of the devices that have not settled, and how far off the worst of them is."""
+        """The exception with the slots of the devices that have not settled, and the temperature of the worst one."""
         limits, span = self.config.soak, past[-1][0] - past[0][0]
         rows = [row for _, row in past]
         late = {

@@ -57,7 +57,7 @@ class Watch:
     _heard: float = field(default_factory=steady)
 
     def until_gone(self) -> str:
-        """Why the run counts as gone; empty where it has reported the station safe."""
+        """Waits until the run is gone and returns the reason; empty if it has reported the station safe."""
         while True:
             reason = self._message()
             if reason is not None:
@@ -72,7 +72,7 @@ class Watch:
             pass
 
     def _message(self) -> str | None:
-        """Why watching ends; empty where the station is safe; None where it continues. Answers the run's heartbeat."""
+        """The reason why watching ends, empty if the station is safe; None if it continues. Answers the run's heartbeat."""
         ready, _, _ = select.select([0], [], [], POLL_S)
         if not ready:
             return ENDED if os.getppid() != self.parent else None

@@ -22,11 +22,11 @@ _NUMBERS = 4_000_000
 
 
 def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Generator) -> float:
-    """Natural logarithm of the probability that an adequate model fits as badly somewhere, over all looks together.
+    """Log probability that an adequate model has a test statistic as extreme in any of all tests.
 
-    The look that fails most is compared with the most failing look of noise drawn from the fitted covariance, whose own noise
-    is estimated again (of the model's own residuals where their tails are heavy); a failure far beyond what draws can show is
-    charged with the number of looks instead.
+    The smallest p-value is compared with the smallest p-values of simulated noise (drawn from the fitted covariance, or from the
+    model's residuals where their tails are heavy), with the noise of each draw estimated again. A p-value too small for the
+    number of draws is multiplied by the number of tests instead (Bonferroni).
     """
     worst, looks = _worst_look(field, drivers, model)
     draws = NoiseDraws(model, rng)
@@ -34,16 +34,16 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
     certain = CERTAIN_BELOW**2 if draws.heavy else CERTAIN_BELOW
     if charged < np.log(certain):
         return float(charged)
-    return _against_draws(draws, lambda: _everything(field, drivers), worst)
+    return _against_draws(draws, lambda: _all_tests(field, drivers), worst)
 
 
 def _worst_look(field: Candidates, drivers: list[Driver], model: Model) -> tuple[float, int]:
-    """Natural logarithm of the smallest probability of a look at the residuals of a model, and the number of looks."""
+    """Natural logarithm of the smallest p-value of all tests of a model's residuals, and the number of tests."""
     space = model.space
     common = shared_noise(model)
     of_poses = max(common, scatter_of_poses(model))
     worst, looks = 0.0, 0
-    for candidate in _everything(field, drivers):
+    for candidate in _all_tests(field, drivers):
         gain = space.gain(candidate)
         looks += gain.drop.size
         for point, (drop, rank) in enumerate(zip(gain.drop.tolist(), gain.rank.tolist(), strict=True)):
@@ -51,21 +51,21 @@ def _worst_look(field: Candidates, drivers: list[Driver], model: Model) -> tuple
             together = of_poses if candidate.shared else common
             if log_p < worst and together > 1.0:
                 log_p = log_p_value(
-                    space, drop * _own_part(space, candidate, point, together, model.problem.per_unit), rank
+                    space, drop * _part_not_shared(space, candidate, point, together, model.problem.per_unit), rank
                 )
             worst = min(worst, log_p)
     return worst, looks
 
 
 def _against_draws(draws: NoiseDraws, looks: Callable[[], Iterable[Candidate]], worst: float) -> float:
-    """Logarithm of the share of draws that fail as much somewhere; drawing ends when the result is clear."""
+    """Log share of noise draws with a p-value as small as ``worst`` in any test; drawing ends when the result is clear."""
     blocks, n = draws.model.problem.blocks, draws.model.problem.n
     batch = int(np.clip(_NUMBERS // (blocks * n), 5, _BATCH))
     if blocks * n > LARGE:
         draws.model.forget()  # the draws need the memory
     drawn, beyond = 0, 0
     while drawn < DRAWS and beyond < ENOUGH:
-        # what the first batch does not decide two together seldom leave undecided: columns are made once for both
+        # if the first batch is undecided, the next two usually decide: they run together, so that columns are made once
         batches = 1 if not drawn else min(2, -(-(DRAWS - drawn) // batch))
         for used, log_p in enumerate(draws.worst(looks(), batch, batches), 1):
             drawn, beyond = drawn + log_p.size, beyond + int(np.count_nonzero(log_p <= worst))
@@ -75,8 +75,8 @@ def _against_draws(draws: NoiseDraws, looks: Callable[[], Iterable[Candidate]], 
     return float(np.log((1.0 + beyond) / (1.0 + drawn)))
 
 
-def _own_part(space: Space, candidate: Candidate, point: int, common: float, axes: int) -> float:
-    """Part of the reduction by a test that remains if the noise common to all units is taken into account."""
+def _part_not_shared(space: Space, candidate: Candidate, point: int, common: float, axes: int) -> float:
+    """Factor on the reduction by a test that accounts for noise common to all units (φ = ``common``)."""
     if candidate.shared:
         return 1.0 / common
     units = space.targets.shape[0] // axes
@@ -88,6 +88,6 @@ def _own_part(space: Space, candidate: Candidate, point: int, common: float, axe
     return 1.0 - float(units * np.sum(fitted.mean(axis=0) ** 2) / total) * (1.0 - 1.0 / common)
 
 
-def _everything(field: Candidates, drivers: list[Driver]) -> Iterator[Candidate]:
+def _all_tests(field: Candidates, drivers: list[Driver]) -> Iterator[Candidate]:
     yield from field.pieces()
     yield from (d.candidate for d in drivers)

@@ -1,4 +1,4 @@
-"""Bad dwells, but those that an effect explains at a lower price."""
+"""Bad dwells, except those that an effect explains at a lower price."""
 
 from collections.abc import Sequence
 
@@ -18,10 +18,10 @@ from inertial.estimation.term import Term
 
 
 def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
-    """The bad dwells of a lot, without those that an effect explains at a lower price than they have together.
+    """The bad dwells of a lot, without those that an effect explains at a lower price than that of removing all of them.
 
-    The first dwells of a sensor that warms up deviate most: left out, they take the warm-up with them. An effect that explains
-    a single one has to be seen in the other dwells, too: otherwise it only restates that the dwell is bad.
+    The first dwells of a sensor that warms up deviate most; if they are left out, the warm-up is no longer visible. An effect
+    that explains a single dwell must be significant in the other dwells, too: otherwise it only restates that the dwell is bad.
 
     Parameters
     ----------
@@ -44,13 +44,13 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
 
 
 def _seen_without(base: Model, effects: list[AnyEffect], term: Term, bad: list[BadDwell]) -> bool:
-    """Whether a term explains more than its price with the bad dwells left out, as a named effect has to in a single look."""
+    """Whether a term exceeds its price, by the margin of a single test, with the bad dwells left out."""
     rest = model_without(base, [d.index for d in bad])
     return -judge(Candidates(rest.problem, effects), rest, term).cost > float(np.log(max(rest.problem.count, 1)))
 
 
 def _score(base: Model, bad: BadDwell) -> float:
-    """What a bad dwell explains, less the price of its deviation and of the choice among all dwells."""
+    """Reduction of the deviance by removing a bad dwell, less the price of its deviation and of the choice among all dwells."""
     units, n = base.problem.lot.state.time.shape
     dof = max(base.space.dof, 1)
     drop = dof * float(np.log1p(bad.deviations**2 / dof))
@@ -58,7 +58,7 @@ def _score(base: Model, bad: BadDwell) -> float:
 
 
 def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
-    """Effects and covariates beyond those that a model holds."""
+    """Effects of the catalogue and recorded covariates that are not among the ids ``held`` by the model."""
     state = base.problem.lot.state
     effects = [e for e in catalogue.catalogue().values() if e.id not in set(held)]
     names = [name for name, values in state.covariates.items() if varies(values)]

@@ -21,15 +21,15 @@ __all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
 
 
 _MOST = 9
-"""Rivals whose own noise is estimated."""
+"""Largest number of rivals for each of which the noise is estimated again."""
 
 _FEWEST = 3
-"""Axes of a unit, and units from which coefficients can be said to be alike."""
+"""Smallest number of units for the test whether their coefficients are equal."""
 
 
 @dataclass(frozen=True)
 class Member:
-    """An effect that explains the data as well as the best of its class; ``score`` in chi-square behind the best."""
+    """An effect that explains the data as well as the best of its class; ``score``: chi-square by which it is worse."""
 
     term: Term
     score: float
@@ -39,9 +39,9 @@ class Member:
 class EffectClass:
     """Effects that the data cannot separate, best first, with the result of the best of them.
 
-    log_p : log probability of the same reduction by noise
-    size : RMS of the effect beyond the part that the rest of the model absorbs, g
-    alike : whether coefficients that are the same in all units explain as much as a sensor's own
+    log_p : log probability that noise gives the same reduction
+    size : RMS, g, of the effect beyond the part that the rest of the model absorbs
+    alike : whether coefficients common to all units explain as much as separate coefficients for each sensor
     """
 
     members: tuple[Member, ...]
@@ -64,7 +64,7 @@ class EffectClass:
 
     @property
     def proposed(self) -> Term:
-        """The member to recommend: the simplest of those that the best does not lead clearly; handling errors come first."""
+        """The member to recommend: the simplest of those not clearly worse than the best; handling errors have priority."""
         near = [m for m in self.members if m.score < CLEAR_LEAD or isinstance(m.term.effect, Handling)]
         return min(near, key=lambda m: m.term.effect.simplicity).term
 
@@ -80,18 +80,20 @@ class EffectClass:
 
 
 def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
-    """The class of a term beside all other terms of a model; every serious rival with its own noise."""
+    """The class of a term, beside all other terms of a model; the noise is estimated again for every serious rival."""
     rest = model.without_term(term)
     leave = {t.effect.id for t in rest.terms if not isinstance(t.effect, Handling)}
     looked = scanned(field, [rest.at(model.noise)], leave)[0]
     of_term = judge(field, rest, term)
-    least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR * _stretch(term, looked, of_term)
+    least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR * _score_stretch(
+        term, looked, of_term
+    )
     near = [t for t, score in looked[:_MOST] if score > least and t.effect.id != term.effect.id]
     near = [t for t in near if term.effect.id not in t.effect.after]
     judged = [judge_refined(field, rest, t, model.noise) for t in near]
     judged = ranked([of_term, *judged])
     if isinstance(term.effect, Handling):
-        # an effect that explains far more than an error of handling is beside it, and no rival of it
+        # an effect that explains far more than the handling error exists in addition to it and is no rival of it
         held = next(rival for rival in judged if rival.term is of_term.term)  # ranked: at the noise of the best of them
         judged = [rival for rival in judged if rival is held or rival.cost > held.cost - CLASS_WIDTH]
     jumps = jumps_in_place_of(field, rest, judged[0])
@@ -103,9 +105,9 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
 
 
 def _alike(model: Model, term: Term) -> bool:
-    """Whether coefficients that all units share explain as much as coefficients of every unit, each at its price.
+    """Whether coefficients common to all units explain as much as separate ones, each less its price.
 
-    What a table, a fixture or a reference does is the same in every unit; sensors of one design can have it alike, too.
+    Effects of a table, a fixture or a reference are equal in every unit; sensors of one design can have equal effects, too.
     """
     units = model.problem.lot.state.time.shape[0]
     if units < _FEWEST or model.problem.lot.radial or term.shared:
@@ -120,18 +122,18 @@ def _alike(model: Model, term: Term) -> bool:
 
 
 def _with_jumps(judged: list[Rival], jumps: Jumps) -> list[Rival]:
-    """Rivals with the jumps of single axes instead of the best rival, at the score that the jumps have together."""
+    """The rivals with the jumps of single axes added, or moved up, at the score that these jumps have together."""
     best, first = judged[0], jumps.terms[0]
     same = next((r for r in judged if r.term.effect.id == first.effect.id), replace(best, term=first, ratio=None))
     others = [r for r in judged if r is not same]
     return sorted([*others, replace(same, cost=min(same.cost, best.cost - jumps.ahead))], key=lambda r: r.cost)
 
 
-def _stretch(term: Term, looked: Sequence[tuple[Term, float]], of_term: Rival) -> float:
-    """Factor by which scores at the noise of the best differ more than those of rivals each at its own noise; one at least.
+def _score_stretch(term: Term, looked: Sequence[tuple[Term, float]], of_term: Rival) -> float:
+    """Ratio, at least 1, of the score of a term at the noise of the model with it to its score with the noise estimated again.
 
-    What wander could take up of a slow effect counts in full at a noise without it: with four soaks in one direction a cubic of
-    the temperature has a score of a thousand there, and of forty at the noise that is estimated again.
+    At a noise without wander, the part of a slow effect that wander could absorb counts in full: with four soaks in one direction
+    a cubic in temperature has a score of a thousand there, and of forty with the noise estimated again.
     """
     at_this_noise = next((score for other, score in looked if other.effect.id == term.effect.id), 0.0)
     return max(at_this_noise / max(-of_term.cost, 1.0), 1.0)

@@ -1,4 +1,4 @@
-"""A curve of one driver with the same shape for every unit and axis: the sign of an effect that the catalogue lacks."""
+"""A curve of one driver with the same shape for every unit and axis: evidence of an effect that the catalogue lacks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from inertial.estimation.space import Space
 _TURNS = 8  # alternating estimates of sizes and shape
 
 _BEHIND, _SHARE_BEHIND = 60.0, 0.25
-"""Cost, and share of what the best curve gains, above the best at given noises from which the noise of a curve is not sought.
+"""Excess of cost over the best curve, absolute and as a share of that curve's gain, above which no noise is estimated for it.
 
 Of 322 curves beside lots with hidden effects an estimate of the noise took 30 off the cost at most where that mattered; with both
 no verdict of the 302 cases of the scoreboard changes.
@@ -25,11 +25,11 @@ no verdict of the 302 cases of the scoreboard changes.
 
 @dataclass(frozen=True)
 class CurveFit:
-    """A common curve beside a model.
+    """A common curve added to a model.
 
-    driver : with the columns that the curve was made of; model : with the curve in it
-    rank : number of coefficients, of sizes and shape
-    cost : penalised deviance, on the scale of the search
+    driver : driver with the columns that span the curve; model : model with the curve added
+    rank : number of coefficients of the curve's sizes and its shape
+    cost : penalised deviance of that model, on the scale of the search
     """
 
     driver: Driver
@@ -39,14 +39,14 @@ class CurveFit:
 
 
 def fit_curves(model: Model, drivers: Sequence[Driver], noises: Sequence[Noise] = ()) -> list[CurveFit]:
-    """The best common curve of every driver added to a model, with the noise estimated again.
+    """The best common curve of every driver, each added to the model with the noise estimated again.
 
-    Drivers of the same columns, such as time and time since power-on of one run, have one fit.
+    Drivers with equal columns, such as time and time since power-on of one run, are fitted once.
 
     Parameters
     ----------
-    noises : at which the curves are compared first; those far behind the best there keep that fit, an upper limit of their cost,
-        since the search for the noise of one costs as much as all of these comparisons
+    noises : noises at which the curves are compared first; curves far worse than the best keep that fit, an upper limit of their
+        cost, because estimating the noise for one curve takes as long as all of these comparisons
     """
     first = [next(j for j, other in enumerate(drivers) if _same(other, driver)) for driver in drivers]
     alone = dict.fromkeys(first)
@@ -70,13 +70,13 @@ def _same(driver: Driver, other: Driver) -> bool:
 
 
 def _fitted(model: Model, driver: Driver) -> CurveFit:
-    """The best common curve of a driver: at the noise of the model, then at the noise beside the first curve."""
+    """The best common curve of a driver: at the noise of the model, then at the noise estimated with that curve."""
     fit = _with_curve(model, driver, model.noise)
     return fit if driver.candidate.shared else _with_curve(model, driver, fit.model.noise)
 
 
 def _with_curve(model: Model, driver: Driver, noise: Noise, *, held: bool = False) -> CurveFit:
-    """The common curve of a driver that is best at a noise; with the noise beside it as estimated, or held."""
+    """The common curve of a driver that is best at a noise, in a model whose noise is estimated again or, if ``held``, kept."""
     candidate = driver.candidate
     if candidate.shared:
         fitted, rank, shape = model.with_shared_curves(candidate.of_blocks[:, :, 0, :]), 0, 0
@@ -94,7 +94,7 @@ def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
     blocks, n = flat.shape[:2]
     white = space.whiten(flat)
     columns, white, free = (a.reshape(blocks, n, ways, -1) for a in (flat, white, space.project(white)))
-    even = _evened(np.einsum("bnwp,bnwr->pr", free, free), np.sqrt(np.einsum("bnwp,bnwp->p", white, white)))
+    even = _decorrelation(np.einsum("bnwp,bnwr->pr", free, free), np.sqrt(np.einsum("bnwp,bnwp->p", white, white)))
     columns = columns @ even
     free = (free @ even).reshape(blocks, n, -1)
     gram = np.swapaxes(free, -1, -2) @ free
@@ -102,7 +102,7 @@ def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
     curves = np.linalg.solve(gram + 1e-6 * np.eye(gram.shape[-1]), right[..., None])[..., 0]
     count = even.shape[-1]
     gram, right = gram.reshape(blocks, ways, count, ways, count), right.reshape(blocks, ways, count)
-    # the leading direction of the curves that each block and way has by itself
+    # start: the leading direction of the curves fitted to each block and way separately
     shape = np.linalg.svd(curves.reshape(-1, count), full_matrices=False)[2][0].astype(np.float64)
     for _ in range(_TURNS):
         inner = np.einsum("p,bwpvr,r->bwv", shape, gram, shape) + 1e-12 * np.eye(ways)
@@ -113,9 +113,9 @@ def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
     return columns @ shape, blocks * ways + count - 1
 
 
-def _evened(gram: Array, size: Array) -> Array:
-    """Transformation (p, r) to columns of equal size and no correlation over the lot, without the part that the model absorbs."""
-    scale = np.maximum(size, 1e-150)  # its square is a number, too
+def _decorrelation(gram: Array, size: Array) -> Array:
+    """Transformation (p, r) to uncorrelated columns of equal size over the lot, without the part that the model absorbs."""
+    scale = np.maximum(size, 1e-150)  # so that its square does not underflow
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     keep = values > 1e-6 * values[-1]
     return (vectors[:, keep] / np.sqrt(values[keep])) / scale[:, None]

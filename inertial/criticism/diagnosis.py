@@ -31,10 +31,10 @@ from inertial.estimation.space import Space
 
 @dataclass(frozen=True)
 class Suspected:
-    """Effects that explain a residual better than noise does as a rule, but not so clearly that one is named.
+    """Effects that explain the residuals better than noise usually does, but not clearly enough to be named.
 
-    effects : ids, best first; log_p : natural logarithm of the probability, over all looks, that noise explains as much
-    rms_after : of the residuals with the best of them, g
+    effects : ids, best first; log_p : natural logarithm of the probability, over all tests, that noise explains as much
+    rms_after : RMS, g, of the residuals with the best of them in the model
     """
 
     effects: tuple[str, ...]
@@ -46,12 +46,13 @@ class Suspected:
 class Diagnosis(Verdict):
     """The verdict on a model by a lot, with what explains it; errors in g.
 
+    where : drivers that the residuals depend on significantly; unseen : ids of effects that the plan cannot show
     named : the classes of missing effects
-    without_removed : the verdict on the dwells that were not removed; None if there are none, or it cannot be given
-    carried : dwells of largest influence: on the first class, or the largest residuals if there is no class
-    unseen_in_part : effects that the plan cannot see at some values of their nonlinear parameters, with these
-    smallest : the smallest detected size of each effect, those that slow noise hides most first
-    suspected : None, or what a model that fails without a named cause lacks most probably
+    without_removed : whether the remaining dwells pass; None if no dwell was removed, or they do not suffice for a verdict
+    carried : dwells of largest influence on the first class, or of largest residuals if there is no class
+    unseen_in_part : effects that the plan cannot show at some values of their nonlinear parameters, with these values
+    smallest : the smallest detectable size of each effect, effects hidden most by slow noise first
+    suspected : the most probable missing effects of a model that fails without a named cause, else None
     """
 
     where: tuple[Misfit, ...]
@@ -106,7 +107,7 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
 
 
 def _suspected(verdict: Verdict) -> Suspected | None:
-    """The effects of the first step of the search that noise seldom explains; None where an error of handling is before them."""
+    """The effects of the first search step that noise seldom explains; None if a handling error is among them."""
     enough = np.log(ADEQUATE_ABOVE / max(verdict.search.field.looks, 1))
     seldom = [rival for rival in verdict.result.ladder if rival.log_p < enough]
     if not seldom or any(isinstance(rival.term.effect, Handling) for rival in seldom):
@@ -125,7 +126,7 @@ def _beyond_pose(base: Model, drivers: Sequence[Driver], final: Model) -> Space:
 
 
 def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> CarriedEvidence:
-    """The largest residuals where nothing is named, and the probability of the others; not that without a generator."""
+    """The largest residuals where nothing is named, and, given a generator, the probability of the remaining dwells."""
     dwells = influence(base, None)
     if rng is None or not dwells:
         return CarriedEvidence(dwells)
@@ -135,7 +136,7 @@ def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> Carrie
 
 
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
-    """A class for every identified effect, the largest first."""
+    """The class of every identified effect, the largest effect first."""
     held = {t.effect.id for t in base.terms}
     model, classes = final, []
     for term in [t for t in final.terms if t.effect.id not in held]:
@@ -150,9 +151,10 @@ def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
 
 
 def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tuple[Named, ...]:
-    """Errors after each class is added to the classes before it; where it adds nothing so, beside all others.
+    """The classes with the errors before and after each is added, in order, to the model with the classes before it.
 
-    A second effect as large as the first, of another shape, hides from the dwells left out what the first predicts.
+    Where a class does not reduce the error on dwells left out, the comparison is repeated beside all other classes: a second
+    effect as large as the first can mask what the first predicts.
     """
     named: list[Named] = []
     model = base

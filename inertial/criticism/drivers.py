@@ -29,9 +29,8 @@ _DIGITS = 6
 _CERTAIN = -600.0
 """Logarithm of a probability below which drivers are ranked by the share that they explain."""
 
-
 Part = Literal["bias", "scale", "axes", "transfer"]
-"""What of an output follows a driver: the bias, the scale factor, the directions of the axes, or the transfer curve."""
+"""The property of an output that depends on a driver: bias, scale factor, directions of the axes, or transfer curve."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +38,11 @@ class Driver:
     """Columns of a smooth dependence on one driver.
 
     name : as in the exchange format (``unit_C``, ``time_s``, a covariate), or ``pose``, ``approach``, ``temperature_rate``
-    make : its columns
-    values : (units, n) of the driver itself, of a suspect (blocks, n), 0 … 1 over the run; None if it is not a single quantity
-    part : what of the output follows it
-    ways : ways in which each block feels the dependence, with a size for each: the columns of the first way come before
-        those of the second
-    period : of a swing with the time, s; None of another curve
+    make : function that computes the columns
+    values : (units, n), values of the driver; of a suspect (blocks, n), scaled to 0 … 1; None if it is not a single quantity
+    part : property of the output that depends on the driver
+    ways : number of column groups of each block with separate sizes (such as two cross axes), group after group
+    period : s, period of an oscillation in time; None for any other curve
     """
 
     name: str
@@ -56,13 +54,13 @@ class Driver:
 
     @property
     def candidate(self) -> Candidate:
-        """The columns as a candidate, made for each use: those of all drivers of a large lot take hundreds of megabytes."""
+        """The columns as a candidate, computed at each use: in a large lot those of all drivers take hundreds of megabytes."""
         return self.make()
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """A driver of the residual, the affected axes, and the share of the excess that it explains."""
+    """A driver of the residuals, the affected axes, and the share of their excess over noise that it explains."""
 
     driver: str
     axes: tuple[str, ...]
@@ -90,9 +88,10 @@ def drivers_of(problem: Problem) -> list[Driver]:
 
 
 def looks_of(problem: Problem) -> list[Driver]:
-    """The drivers, and where the axes or the transfer curve follow one: that a fixture bends shows in no bias.
+    """All drivers, with drivers of axis directions and of the transfer curve: a bending fixture does not change any bias.
 
-    Axes with time and the temperature of the units, the transfer curve with the temperature: each look costs power in all others.
+    Axis directions may depend on time and unit temperature, the transfer curve on temperature; no other dependence is tested,
+    because each test reduces the power of all others.
     """
     looks = drivers_of(problem)
     if problem.lot.radial:
@@ -107,12 +106,12 @@ def looks_of(problem: Problem) -> list[Driver]:
 
 
 def _across_axes(problem: Problem, values: Array) -> Candidate:
-    along, values = _typical(problem, values)
+    along, values = _of_one_unit(problem, values)
     return _of_axes(problem, across(along, curve(values, _BENT_KNOTS), problem.axes))
 
 
 def _transfer_curve(problem: Problem, values: Array) -> Candidate:
-    along, values = _typical(problem, values)
+    along, values = _of_one_unit(problem, values)
     return _of_axes(problem, transfer(of_axes(along, problem.axes, 1), values, _TRANSFER_KNOTS))
 
 
@@ -122,26 +121,26 @@ def _of_axes(problem: Problem, columns: Array) -> Candidate:
     return Candidate(columns[:, :, None, :], shared=False, rows=rows)
 
 
-def _typical(problem: Problem, values: Array) -> tuple[Array, Array]:
-    """Forces and a quantity of one unit instead of all, where the forces are equal in all: a look needs no more."""
+def _of_one_unit(problem: Problem, values: Array) -> tuple[Array, Array]:
+    """Forces and the mean of a quantity for one unit instead of all units, where the forces are equal in all of them."""
     along = forces_along(problem)
     same = bool(np.all(along == along[:1]))
     return (along[:1], values.mean(axis=0, keepdims=True)) if same else (along, values)
 
 
 def forces_along(problem: Problem) -> Array:
-    """The force along each axis, those without an output too, (units, 3, n), g."""
+    """The force along each of the three axes, measured or not, (units, 3, n), g."""
     along = np.stack([problem.lot.state.along(axis) for axis in range(3)], axis=1)
     return np.broadcast_to(along, (problem.blocks // problem.per_unit, 3, problem.n))
 
 
 def own_forces(problem: Problem) -> Array:
-    """The force along each axis with an output, (units, axes, n), g."""
+    """The force along each measured axis, (units, axes, n), g."""
     return of_axes(forces_along(problem), problem.axes, 1)
 
 
 def transfer(along: Array, values: Array, knots: int) -> Array:
-    """A curve of forces (units, 3, n) along each axis times a quantity (units or 1, n), (3 units, n, d)."""
+    """Spline columns (axes · units, n, d) of forces (units, axes, n), times a centred quantity (units or 1, n)."""
     middle = 0.5 * (float(np.max(values)) + float(np.min(values)))
     each = (values - middle) / max(float(np.ptp(values)), 1e-12)
     columns = curve(along, knots) * each[:, None, :, None]
@@ -149,7 +148,7 @@ def transfer(along: Array, values: Array, knots: int) -> Array:
 
 
 def across(along: Array, columns: Array, axes: tuple[int, ...] = ALL_AXES) -> Array:
-    """Columns (units or 1, n, d) times the forces (units, 3, n) across each axis, (blocks, n, 2 d): one way, then the other."""
+    """Columns (units or 1, n, d) times the two forces across each axis, from ``along`` (units, 3, n): (blocks, n, 2 d)."""
     wide = [of_axes(np.roll(along, -way, axis=1), axes, 1)[..., None] * columns[:, None] for way in (1, 2)]
     return np.concatenate([w.reshape(-1, *w.shape[2:]) for w in wide], axis=-1)
 
@@ -178,7 +177,7 @@ def curve(values: Array, knots: int) -> Array:
 
 
 def _pose_columns(state: State, most: int) -> Array:
-    """Polynomials of the direction of gravity from second degree on, at most so many, (units, n, d)."""
+    """Polynomials of the direction of gravity, complete degrees from 2 to 4 with at most ``most`` columns, (units, n, d)."""
     columns: list[Array] = []
     f = np.moveaxis(state.force, -1, 0)
     for degree in (2, 3, 4):
@@ -209,7 +208,7 @@ def _by_axis(problem: Problem, values: Array) -> Candidate:
 
 
 _OF_POSE = frozenset({"pose", "approach", "outer_deg", "inner_deg"})
-"""Drivers that are the pose, or how it was reached."""
+"""Drivers that describe the pose, or how it was reached."""
 
 
 def misfits(
@@ -217,13 +216,13 @@ def misfits(
 ) -> list[Misfit]:
     """Drivers of the residuals of a space, most significant first.
 
-    A temperature that drifts by hundredths of a kelvin, or the time, follows the sequence of the poses: a quantity is a driver by
-    what it explains beyond the pose.
+    Time, or a temperature that drifts by hundredths of a kelvin, is correlated with the sequence of poses: a quantity is judged
+    by what it explains beyond the pose.
 
     Parameters
     ----------
-    floor_variance : variance of an adequate model, in the unit of the space
-    beyond : the same residuals after any dependence on the pose
+    floor_variance : residual variance of an adequate model, in units of the space
+    beyond : space of the same residuals after any dependence on the pose is removed
     """
     excess = max(space.rss - space.dof * floor_variance, 1e-12)
     found: list[Misfit] = []
@@ -234,11 +233,11 @@ def misfits(
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
             found.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
-    # two clocks of a run explain equally much: their order must not depend on rounding errors
+    # two clocks of a run explain the residuals equally well: their order must not depend on rounding errors
     found.sort(key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
     best: dict[str, Misfit] = {}
     for misfit in found:
-        best.setdefault(misfit.driver, misfit)  # of its bias, its axes and its transfer curve what follows it most
+        best.setdefault(misfit.driver, misfit)  # the part (bias, axes, transfer curve) that depends on it most
     return list(best.values())
 
 

@@ -1,4 +1,4 @@
-"""The basis of a verdict: degrees of freedom, condition, single dwells, and the smallest detected effect."""
+"""The basis of a verdict: degrees of freedom, condition number, influence of single dwells, smallest detectable effect."""
 
 from dataclasses import dataclass
 
@@ -18,18 +18,18 @@ FEWEST_DOF = 9
 """Degrees of freedom needed for a verdict if the noise is known from the residuals only: 18 positions of unknown orientation.
 
 Of 80 lots of 18 random positions with white noise of 0.3 mg 73 are adequate, 4 cannot be judged, 3 are not adequate (4 %); with
-a cubic term of 10 mg/g³ 18 of 20 are not adequate and 11 name it, of 20 positions 18 and 15. "Adequate" is told with the smallest
-cubic term that is detected (FEW_DOF), which is large.
+a cubic term of 10 mg/g³ 18 of 20 are not adequate and 11 name it, of 20 positions 18 and 15. "Adequate" is stated with the
+smallest detectable cubic term (FEW_DOF), which is large.
 """
 
 FEW_DOF = 60
-"""Degrees of freedom below which "adequate" is given with the smallest detected cubic term."""
+"""Degrees of freedom below which "adequate" is stated with the smallest detectable cubic term."""
 
 GROSS = 0.02
-"""Residual, g rms, above the noise of any usable sensor: the model is wrong even with few dwells."""
+"""Residual, g rms, above the noise of any usable sensor: larger ones refute the model even with few dwells."""
 
 SMOOTH = 1e4
-"""Variance of a random walk over the record, over the white variance, from which dwells without recorded noise are a movement.
+"""Share of random walk from which dwells without recorded noise are taken to be samples of a movement.
 
 A walk of 8 µg/√s over an hour beside 10 µg of white noise has 2300."""
 
@@ -44,10 +44,10 @@ _SMALLEST, _LARGEST = 1e-9, 1.0  # g/g³
 class Evidence:
     """The basis of a verdict.
 
-    dof : degrees of freedom of the residuals; condition : of the scaled columns of the worst block
-    bias_spread : jackknife standard deviation of the bias, worst axis, g; bias_change : its largest change by one dwell, g
-    carrier : unit and dwell of that change; largest : largest studentised residual of a dwell, and which
-    cubic : smallest cubic coefficient detected with a probability of one half, g/g³; None if there is none
+    dof : degrees of freedom of the residuals; condition : condition number of the scaled columns, worst block
+    bias_spread : g, jackknife standard deviation of the bias, worst axis; bias_change : g, its largest change by one dwell
+    carrier : unit and dwell of that change; largest : largest studentised residual of a dwell, with unit and dwell
+    cubic : g/g³, smallest cubic coefficient detected with a probability of one half; None if there is none
     """
 
     dof: int
@@ -108,7 +108,7 @@ def condition(model: Model) -> float:
 
 
 def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int] | None]:
-    """Jackknife of the bias, its largest change by leaving out one dwell, and which unit and dwell that is."""
+    """Jackknife standard deviation of the bias, g, its largest change, g, by leaving out a dwell, and that unit and dwell."""
     columns = next((at for term, at in model.slices(shared=False) if term.effect.id == "bias"), None)
     if columns is None:
         return None, None, None
@@ -127,7 +127,7 @@ def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int]
 
 
 def _deleted(model: Model) -> tuple[Array, Array]:
-    """Deviation of each dwell when it is deleted, (blocks, n), g, and that over its error."""
+    """Deletion residual of each dwell, (blocks, n), g, and the same over its standard error."""
     space = model.space
     left, size = space.deleted
     known = space.covariance.there & (size > 1e-9 * size.max(axis=1, keepdims=True))
@@ -136,7 +136,7 @@ def _deleted(model: Model) -> tuple[Array, Array]:
 
 
 def _largest(model: Model) -> tuple[float, int, int] | None:
-    """The dwell that deviates most from its prediction by all others: externally studentised residual, unit, dwell."""
+    """The dwell with the largest externally studentised residual: the residual, its unit and its dwell."""
     space, axes = model.space, model.problem.per_unit
     blocks = space.local.shape[0]
     each = _deleted(model)[1]
@@ -150,7 +150,7 @@ def _largest(model: Model) -> tuple[float, int, int] | None:
 
 
 def _cubic(model: Model, field: Candidates) -> float | None:
-    """Smallest detected cubic coefficient, g/g³, by the non-central F distribution over all tests."""
+    """Smallest detectable cubic coefficient, g/g³, by the noncentral F distribution over all tests; None if there is none."""
     if any(t.effect.id == "third_order" for t in model.terms):
         return None
     effect = catalogue.get("third_order")

@@ -1,4 +1,4 @@
-"""A run under examination: bad dwells and handling errors are removed before effects are judged."""
+"""Examination of a run: bad dwells and handling errors are removed before effects are judged."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -31,16 +31,16 @@ from inertial.estimation.refinement import better_placed, replaced, terms_of
 from inertial.estimation.term import Term, with_turn_on
 
 _MENDED = 6  # largest number of handling errors reported for one run
-_TURNS = 3  # searches after which single dwells are not tested again
+_TURNS = 3  # largest number of repeated tests of single dwells, each with a new search
 
 
 @dataclass(frozen=True)
 class Named:
-    """A class of effects that is missing, with the errors before and after it is added; g.
+    """A missing class of effects, with the errors, g, before and after it is added to the model.
 
-    heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN if none can
-    units, dwells : that an alternative of scope "data" concerns, none for all units; evidence : its description
-    carried : the dwells of largest influence; term : the alternative in the model, if it stays there
+    heldout_before, heldout_after : g, RMS error on dwells left out, of the worst kind of fold that can judge both; NaN if none
+    units, dwells : indices affected by a handling error, no units: all of them; evidence : its description
+    carried : the dwells of largest influence; term : the handling error's term, if it stays in the model
     """
 
     effects: EffectClass
@@ -55,9 +55,9 @@ class Named:
 
     @property
     def predicts(self) -> bool:
-        """Whether the prediction of unfitted dwells is no worse with it: only then it is recommended for a model.
+        """Whether it predicts dwells left out no worse than without it: only then it is recommended for a model.
 
-        Where no dwells left out can judge it (NaN), its evidence decides: it was named by it.
+        True also where no dwells left out can judge it (NaN), because the likelihood has already named it.
         """
         if np.isnan(self.heldout_before) or np.isnan(self.heldout_after):
             return True
@@ -66,12 +66,13 @@ class Named:
 
 @dataclass
 class ExaminedRun:
-    """A lot under examination: the corrections so far, and the terms that stay in the model beside the judged effects.
+    """A lot under examination: the corrections so far, and the terms added to the judged effects.
 
-    barred : alternatives that only imitate a drift, and are not searched again
-    drift : the last drift that had looked like them; then curves of every kind are suspected
-    soak : (n,), number of the soak of each dwell, as measured
-    louder : (units, n, axes), by which the white noise of a dwell is larger than its axis', where it depends on the force
+    beside : terms of handling errors that stay in the model; handled : all handling errors found; removed : bad dwells
+    barred : ids of alternatives that only imitate a drift and are not searched again
+    drift : the latest drift that such alternatives imitated; if there is one, curves of every kind are suspected
+    soak : (n,), index of the soak of each dwell, by the temperatures as measured
+    louder : (units, n, axes), white standard deviation of a dwell over its axis', where it depends on the force
     """
 
     lot: Lot
@@ -86,10 +87,10 @@ class ExaminedRun:
     _made: tuple[list[object], Model] | None = None
 
     def estimate_loudness(self) -> None:
-        """Estimate the noise of each soak again: an error that was corrected is not noise."""
+        """Estimate the noise of each soak again, without the errors corrected meanwhile."""
         self.lot = replace(self.lot, loudness=None)
         if self.soak is None:
-            self.soak = soaks(self.lot.state)  # a correction of temperatures changes none of the soaks
+            self.soak = soaks(self.lot.state)  # stored, so that corrected temperatures do not change the soaks
         loudness = loudness_of(self.model(), self.soak)
         if loudness is not None:
             self.lot = replace(self.lot, loudness=loudness)
@@ -99,13 +100,13 @@ class ExaminedRun:
             self.lot = replace(self.lot, error=self.lot.error * louder)
 
     def was_found(self, term: Term) -> bool:
-        """Whether a sudden change of the whole lot was found before."""
+        """Whether a sudden change of all units by the same effect was found before."""
         return "unit" not in term.keywords and any(
             t.effect.id == term.effect.id and "unit" not in t.keywords for t in self.beside
         )
 
     def withdraw(self, part: LotPart, further: Sequence[Term]) -> bool:
-        """Withdraw sudden changes that are one drift, with what was found beside them; whether there were any."""
+        """Withdraw sudden changes that together with ``further`` terms are one drift; whether there were any."""
         found = part.drift_of(self.beside, further)
         if found is None:
             return False
@@ -116,7 +117,7 @@ class ExaminedRun:
         return True
 
     def model(self) -> Model:
-        """The model that is judged, in the lot without its bad dwells; one object as long as nothing changes."""
+        """The judged model in the lot without its bad dwells; the same object as long as lot and terms do not change."""
         parts: list[object] = [self.lot, *self.removed, *self.beside]
         if self._made is None or list(map(id, self._made[0])) != list(map(id, parts)):
             self._made = parts, self._new_model()
@@ -134,29 +135,29 @@ class ExaminedRun:
 def examined(
     lot: Lot, effects: Sequence[str], barred: frozenset[str] = frozenset()
 ) -> "tuple[ExaminedRun, EffectSearch]":
-    """A run without bad dwells and handling errors (except those of some ids), and the search for effects in it."""
+    """A run freed of bad dwells and handling errors, and the search for effects in it; ``barred`` ids are not searched."""
     run = ExaminedRun(lot, tuple(effects), barred=set(barred))
     run.estimate_loudness()
     run.removed = bad_beside_effects(run.model(), run.effects)
     searched = mended(run)
     for _ in range(_TURNS):
-        # a dwell that is off in most units had been left to a pose that is wrong; nothing was found, so each unit's is bad
+        # a dwell that deviates in most units was reserved for a wrong pose; if no such error was found, it is bad in each unit
         of_all = not run.handled and not searched.result.added
         if of_all and not any_of_all(run.model()):
             break
-        # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
+        # dwells explained by an effect or a handling error are not bad; with it in the model smaller deviations are visible
         problem = Problem(run.lot, slope=searched.base.problem.slope)
         removed = bad_dwells(replaced(Model(problem, searched.model.terms, near=searched.model.noise)), of_all=of_all)
         same = {d.index for d in removed} == {d.index for d in run.removed}
-        if same and not _placed_again(run, searched.model) and not _dropped(run, searched):
+        if same and not _moved_error(run, searched.model) and not _withdrew_error(run, searched):
             break
         run.removed = removed
         searched = mended(run)
     return run, searched
 
 
-def _dropped(run: ExaminedRun, searched: "EffectSearch") -> bool:
-    """Whether a handling error explains nothing any more beside what was found after it; it is then withdrawn."""
+def _withdrew_error(run: ExaminedRun, searched: "EffectSearch") -> bool:
+    """Whether a handling error is no longer convincing beside later findings; the first such error is then withdrawn."""
     for named in run.handled if len(run.handled) + len(searched.result.added) > 1 else ():
         if named.term is None:
             continue
@@ -169,8 +170,8 @@ def _dropped(run: ExaminedRun, searched: "EffectSearch") -> bool:
     return False
 
 
-def _placed_again(run: ExaminedRun, model: Model) -> bool:
-    """Whether a change during the run fits better at another dwell now that the bad dwells are known; it is then moved there."""
+def _moved_error(run: ExaminedRun, model: Model) -> bool:
+    """Whether a change during the run fits better at another dwell, with the bad dwells known; it is then moved there."""
     moved = False
     for at, named in enumerate(run.handled):
         best = None if named.term is None else better_placed(model, named.term)
@@ -187,7 +188,7 @@ def _placed_again(run: ExaminedRun, model: Model) -> bool:
 
 @dataclass(frozen=True)
 class EffectSearch:
-    """A search that ended without a further alternative."""
+    """A search for effects that ended without a further handling error; ``part``: the units searched first."""
 
     base: Model
     field: Candidates
@@ -201,7 +202,7 @@ class EffectSearch:
 
 
 def mended(run: ExaminedRun) -> EffectSearch:
-    """The search for effects; a handling error that ranks first is reported and removed before the next search."""
+    """The search for effects; a handling error that ranks first is recorded and corrected before the next search."""
     while True:
         base = run.model()
         searched_for = [a for a in alternatives() if a.id not in run.barred]
@@ -228,7 +229,7 @@ def mended(run: ExaminedRun) -> EffectSearch:
 
 
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
-    """Remove a handling error from a run, and record it."""
+    """Correct a handling error of a run, and record it."""
     alternative = term.effect
     if not isinstance(alternative, Handling):
         raise TypeError(term.effect.id)
@@ -241,7 +242,7 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     evidence, dwells = _described(fields, searched.model, term, alternative, size)
     before, after = left_out(searched.model), left_out(model, term)
     errors = rms(fitted_residuals(model)), *worst(before, after)
-    lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **location)
+    lot = alternative.settled(run.lot, size, _misfit_of(searched.model, model), **location)
     carried, lasting = carried_by(searched.model, term), term if lot is None else None
     run.handled.append(Named(group, *errors, units, dwells, evidence, carried, lasting))
     if lot is None:
@@ -252,15 +253,15 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
         run.estimate_loudness()
 
 
-def _misfit(model: Model, richer: Model) -> Misfit:
-    """Misfit of a model on the dwells of some units, with the noise of a richer model."""
+def _misfit_of(model: Model, richer: Model) -> Misfit:
+    """The misfit of a model as a function of a lot of some units, at the noise of a richer model."""
     local = [t for t in model.terms if not t.shared]
 
     def left(lot: Lot, units: tuple[int, ...], *, own_noise: bool = False) -> float:
         # dwells that were removed stay removed
         error = model.problem.lot.error[list(units)]
         if own_noise:
-            # the noise of soaks was that of the readings before they were corrected
+            # the loudness of the soaks was estimated before the correction
             return cost_of_model(Model(Problem(replace(lot, error=error, loudness=None)), local))
         problem = Problem(replace(lot, error=error))
         blocks = blocks_of_units(np.array(units), problem.per_unit)
@@ -273,7 +274,7 @@ def _misfit(model: Model, richer: Model) -> Misfit:
 def _described(
     fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
 ) -> tuple[str, tuple[int, ...]]:
-    """The description of a handling error, and its dwells: at each location that explains the run equally well."""
+    """The description of a handling error and its dwells, including other locations that explain the run equally well."""
     lot, location = fields.problem.lot, term.location
     best = judge(fields, beside, term).cost
     texts: list[str] = []

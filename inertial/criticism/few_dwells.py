@@ -1,4 +1,4 @@
-"""Few dwells in stated poses: too few for an estimate of their noise, but enough for their samples to contradict the model."""
+"""Few dwells in stated poses: too few to estimate their noise, but the noise of the samples may contradict the model."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ REASON = (
 
 
 class Contradicted(NamedTuple):
-    """Residual and noise of the samples, g, and the natural logarithm of the probability of such a residual."""
+    """RMS of the residuals and of the noise of the samples, g, and the log probability of such residuals."""
 
     rms: float
     samples: float
@@ -25,12 +25,11 @@ class Contradicted(NamedTuple):
 
 
 def contradicted(base: Model) -> Contradicted | None:
-    """What the noise of the samples says against a model that has too few dwells for a verdict; None where it says nothing.
+    """The contradiction between the noise of the samples and a model with too few dwells for a verdict; None if there is none.
 
-    Six faces leave six degrees of freedom: no verdict rests on a noise that is estimated from them. The noise of the samples is
-    known from hundreds. A residual far beyond it contradicts the model, the stated poses, or dwells without wander; a residual
-    within it shows no adequacy, since most missing effects leave nothing on so few poses. Dwells of unknown orientation state
-    nothing that their samples could contradict.
+    Six faces leave six degrees of freedom, too few to estimate the noise, while the noise of the samples is known from hundreds.
+    Residuals far above it contradict the model, the stated poses, or the absence of wander. Residuals within it do not show
+    adequacy, because most missing effects leave no residual in so few poses. Dwells of unknown orientation are not tested.
     """
     lot = base.problem.lot
     if lot.radial or not lot.recorded:

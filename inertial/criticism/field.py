@@ -22,8 +22,8 @@ class Rival:
     """A candidate at its best values, judged in addition to a model.
 
     drop : reduction of the deviance; rank : number of coefficients that the plan determines
-    cost : penalised deviance, the smaller the better
-    ratio : the likelihood ratio behind them; None if there is none
+    cost : price less reduction of the deviance, smaller is better; log_p : log probability that noise reduces it as much
+    ratio : the likelihood ratio that these come from; None if there is none
     """
 
     term: Term
@@ -35,7 +35,7 @@ class Rival:
 
     @staticmethod
     def of(term: Term, ratio: Ratio) -> "Rival":
-        """A term with its likelihood ratio."""
+        """The rival of a term and its likelihood ratio."""
         return Rival(term, ratio.deviance, ratio.rank, -ratio.score, ratio.log_p, ratio)
 
     def at(self, shared: float) -> "Rival":
@@ -44,12 +44,12 @@ class Rival:
 
 
 class Candidates:
-    """The candidates whose quantities a lot has.
+    """The candidates whose required quantities are recorded in a lot.
 
     Parameters
     ----------
-    effects : of the catalogue, and covariates
-    handling : alternatives to them
+    effects : effects of the catalogue, and covariates
+    handling : handling errors, the alternatives to them
     """
 
     def __init__(self, problem: Problem, effects: Iterable[AnyEffect], handling: Iterable[Handling] = ()) -> None:
@@ -86,18 +86,18 @@ class Candidates:
         return next(e for e in (*self.effects, *self.handling) if e.id == name)
 
     def looks_of(self, name: str) -> int:
-        """Number of looks in the price of an alternative; one for an effect."""
+        """Number of locations that the price of a handling error counts; 1 for an effect."""
         return self._looked.get(name, 1)
 
     def gains(
         self, spaces: Sequence[Space], leave: set[str], *, handling: bool = False, primary: bool = False
     ) -> list[dict[str, Gain]]:
-        """Gain in each space of every candidate that the model does not hold already: columns are made once for all.
+        """For each space the gain of every candidate by id; columns are computed once for all spaces.
 
         Parameters
         ----------
-        leave : ids that are left out; handling : whether errors of handling are looked at
-        primary : of the leading columns alone, for effects of several columns whose first is an effect of its own
+        leave : ids that are left out; handling : whether handling errors are included
+        primary : whether only the leading columns are used, of effects for which these alone are a simpler effect
         """
         gains: list[dict[str, Gain]] = [{} for _ in spaces]
         for effect in (*self.effects, *(self.handling if handling else ())):
@@ -108,7 +108,7 @@ class Candidates:
         return gains
 
     def gain_of(self, space: Space, effect: AnyEffect | Handling) -> Gain:
-        """Gain of one candidate, whether the model holds it or not."""
+        """Gain of one candidate."""
         return self._gain([space], effect, None)[0]
 
     def _gain(self, spaces: Sequence[Space], effect: AnyEffect | Handling, first: int | None) -> list[Gain]:
@@ -120,7 +120,7 @@ class Candidates:
         return [Gain.joined(of_space) for of_space in zip(*parts, strict=True)]
 
     def _every_dwell(self, effect: OfOneDwell) -> Array:
-        """Columns (blocks, n, p) of an alternative of one dwell, for each dwell in turn."""
+        """Columns (blocks, n, p), g per unit of the coefficient, of a handling error in each of the n dwells."""
         if effect.id not in self._single:
             units, n = self.problem.lot.state.time.shape
             change = of_outputs(self.problem.lot, effect.every_dwell(self.problem.lot))

@@ -1,4 +1,4 @@
-"""Influence of dwells on a verdict: their shares of the deviance, and the verdict without the largest."""
+"""Influence of dwells on a verdict: their shares of the deviance, and the verdict without the most influential ones."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from inertial.estimation.term import Term
 
 _MOST, _MOST_DWELLS = 8, 3
 _CARRY = 0.5
-"""Largest total share of the listed dwells; the others are many small ones."""
+"""Total share of the deviance above which no further dwell is listed."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
 
     Parameters
     ----------
-    model : to which the term is added; term : the identified effect, None if the model is adequate
+    model : the model to which the term is added; term : the identified effect, None for the residuals of the model
     """
     before = model.space.residual
     carried = before**2
@@ -43,8 +43,8 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
     if total <= 0.0:
         return ()
     if term is not None and of_station(term):
-        # what concerns all units is carried by a dwell in all of them: without it in one unit, the others still show it
-        return _whole_dwells(each / total)
+        # an effect on all units depends on a dwell in all of them: left out in one unit, the others would still show it
+        return _dwells_of_all_units(each / total)
     influences: list[Influence] = []
     for index in np.argsort(each, axis=None)[::-1][:_MOST].tolist():
         unit, dwell = divmod(index, model.problem.n)
@@ -55,8 +55,8 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
     return tuple(influences)
 
 
-def _whole_dwells(share: Array) -> tuple[Influence, ...]:
-    """The dwells (units, n) that carry most over all units together, each in every unit."""
+def _dwells_of_all_units(share: Array) -> tuple[Influence, ...]:
+    """The dwells of largest share summed over the units, each listed for every unit; ``share`` : (units, n)."""
     total = share.sum(axis=0)
     influences: list[Influence] = []
     for dwell in np.argsort(total)[::-1][:_MOST_DWELLS].tolist():
@@ -82,7 +82,7 @@ def carried_by(model: Model, term: Term) -> CarriedEvidence:
 
 
 def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> float:
-    """Log probability of a term without the dwells of largest influence, at the estimated noise."""
+    """Log probability of a term without the given dwells, at the noise of the model."""
     rest = model_without(model, [(d.unit, d.dwell) for d in dwells])
     space = rest.at(model.noise)
     gain = space.gain(term.candidate(rest.problem))

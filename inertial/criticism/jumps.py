@@ -1,7 +1,7 @@
-"""Jumps of single axes in place of an effect: telegraph noise of a few axes has the shape of a slow effect of the whole lot.
+"""Jumps of single axes in place of an effect: telegraph noise of a few axes can imitate a slow effect of the complete lot.
 
-An effect has coefficients for every unit and axis, so one effect explains three axes that jump by themselves better than any one
-jump does. What the jumps of a few axes explain together is therefore compared with the effect as a whole, at the same noise.
+An effect has coefficients for every unit and axis, so that one effect explains independent jumps of three axes better than any
+single jump does. The jumps of a few axes together are therefore compared with the effect, at the same noise.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ from inertial.estimation.term import Term
 from inertial.probability import log_f_tail
 
 _AXES = 6
-"""Largest number of axes whose jumps take the place of one effect."""
+"""Largest number of axes whose jumps may replace one effect."""
 
 _JUMPS = 4
 """Largest number of jumps of one axis."""
@@ -33,7 +33,7 @@ _JUMPS = 4
 class Jumps:
     """Jumps of single axes in place of an effect.
 
-    terms : those of the axis of the largest gain first; ahead : their score, together, less that of the effect
+    terms : all jumps, those of the axis with the largest gain first; ahead : their total score less that of the effect
     """
 
     terms: tuple[Term, ...]
@@ -41,7 +41,7 @@ class Jumps:
 
 
 @dataclass(frozen=True)
-class _OfAxis:
+class _AxisJumps:
     """The best jumps of one axis, with their score."""
 
     score: float
@@ -54,11 +54,11 @@ def jumps_in_place_of(field: Candidates, model: Model, rival: Rival) -> Jumps | 
     if not alternatives or rival.term.shared or not rival.rank:
         return None
     space = model.at(model.with_term(rival.term).noise)
-    # the variances are those with the effect, or with jumps in its place, in the model: at them deviances are sums of squares
+    # the noise is estimated with the effect in the model; at this fixed noise deviances are sums of squares
     drops = _drops(space, rival.term.candidate(model.problem))
     score = _score(drops, rival, field.problem.per_unit)
     largest = np.argsort(drops)[::-1][:_AXES]
-    # in the same axes jumps explain half as much again as an effect at most
+    # on the same axes jumps explain at most 1.5 times as much as an effect
     if 1.5 * float(drops[largest].sum()) < score - CLASS_WIDTH:
         return None
     single = _single_jumps(field, space, alternatives)
@@ -74,7 +74,7 @@ def jumps_in_place_of(field: Candidates, model: Model, rival: Rival) -> Jumps | 
 
 
 def _drops(space: Space, candidate: Candidate) -> Array:
-    """Reduction of the residuals of each block by an effect, (blocks,), beside the terms that blocks share."""
+    """Reduction of each block's residual sum of squares by an effect, (blocks,), beside the shared terms."""
     white = space.whiten(candidate.of_blocks[:, :, 0, :])
     columns = space.project(white)
     before, size = (np.sqrt(np.einsum("bnp,bnp->bp", each, each)) for each in (white, columns))
@@ -82,13 +82,13 @@ def _drops(space: Space, candidate: Candidate) -> Array:
     inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=SEEN**2, hermitian=True)
     along = np.einsum("bnp,bn->bp", columns, space.residual)
     drops = np.einsum("bp,bpq,bq->b", along, inverse, along)
-    # with their coefficients estimated again the effect explains more
+    # scaled up to the total with the shared coefficients estimated again
     together, total = float(space.gain(candidate).drop[0]), max(float(drops.sum()), 1e-300)
     return drops * max(together / total, 1.0)
 
 
 def _score(drops: Array, rival: Rival, per_unit: int) -> float:
-    """Score of an effect of all axes, of one axis of all units, or of one unit, less what its unevenness within them costs."""
+    """Score of an effect: best of all axes, one axis of all units, and one unit; each penalised for uneven reductions."""
     nonlinear, by_unit = freedom(rival.term), drops.reshape(-1, per_unit)
     scores: list[float] = []
     for parts in (by_unit.reshape(1, -1), by_unit.T, by_unit):
@@ -100,10 +100,10 @@ def _score(drops: Array, rival: Rival, per_unit: int) -> float:
 
 
 def _evenness(drops: Array) -> float:
-    """Twice the log probability that the largest reductions (k,) exceed the others by as much; zero where that is usual.
+    """Twice the log probability that the largest of the reductions (k,) exceed the others by as much; zero if that is usual.
 
-    Coefficients from one normal distribution have reductions of chi-square of one degree of freedom each: those of the m largest
-    and of the others have an F distribution, one for each of the possible choices. Noise alone gives one to each.
+    For coefficients from one normal distribution each reduction is chi-square with one degree of freedom, so that the ratio of
+    the m largest to the others has an F distribution, for each of the possible choices. Noise alone reduces each by 1 on average.
     """
     ordered = np.sort(drops)[::-1]
     count = ordered.size
@@ -111,14 +111,14 @@ def _evenness(drops: Array) -> float:
     for m in range(1, count):
         top, rest = float(ordered[:m].sum()), float(ordered[m:].sum())
         ratio = (top / m) / max(rest / (count - m), 1.0)
-        chances = log(comb(count, m) * count)  # beyond the integers of numpy in large lots
+        chances = log(comb(count, m) * count)  # Python integers: numpy's would overflow in large lots
         unlikely = min(unlikely, 2.0 * (float(log_f_tail(ratio, m, count - m)) + chances))
     return unlikely
 
 
-def _single_jumps(field: Candidates, space: Space, alternatives: Sequence[Handling]) -> dict[int, _OfAxis]:
-    """The best alternative of each block, at its best location."""
-    best: dict[int, _OfAxis] = {}
+def _single_jumps(field: Candidates, space: Space, alternatives: Sequence[Handling]) -> dict[int, _AxisJumps]:
+    """The best single-axis handling error of each block at its best location, by block index."""
+    best: dict[int, _AxisJumps] = {}
     for alternative in alternatives:
         gain = field.gain_of(space, alternative)
         paid = 2.0 * float(np.log(field.looks_of(alternative.id)))
@@ -127,14 +127,14 @@ def _single_jumps(field: Candidates, space: Space, alternatives: Sequence[Handli
             block = int(field.problem.per_unit * location["unit"] + location["axis"])
             score = drop - price(drop, rank) - paid
             if block not in best or score > best[block].score:
-                best[block] = _OfAxis(float(score), (Term(alternative, tuple(location.items())),))
+                best[block] = _AxisJumps(float(score), (Term(alternative, tuple(location.items())),))
     return best
 
 
-def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis]) -> _OfAxis:
-    """The best jumps of one block: one of the alternatives, or several jumps from level to level."""
+def _best(field: Candidates, space: Space, block: int, single: dict[int, _AxisJumps]) -> _AxisJumps:
+    """The best jumps of one block: a single handling error, or several jumps from level to level."""
     axes = len(space.q)
-    tried = [_OfAxis(0.0, ()), *([single[block]] if block in single else [])]
+    tried = [_AxisJumps(0.0, ()), *([single[block]] if block in single else [])]
     jump = next((a for a in field.handling if a.several and a.id in field.grids), None)
     if jump is not None:
         unit, axis = divmod(block, field.problem.per_unit)
@@ -142,12 +142,12 @@ def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis
             chosen = float(np.log(comb(space.q.shape[1] - 1, len(dwells)) * axes))
             here = (("unit", float(unit)), ("axis", float(axis)))
             terms = tuple(Term(jump, (*here, ("dwell", float(k)))) for k in dwells)
-            tried.append(_OfAxis(drop - price(drop, len(dwells)) - 2.0 * chosen, terms))
+            tried.append(_AxisJumps(drop - price(drop, len(dwells)) - 2.0 * chosen, terms))
     return max(tried, key=lambda of_axis: of_axis.score)
 
 
 def _several(space: Space, block: int) -> Iterator[tuple[float, list[int]]]:
-    """Reductions of the deviance by two jumps of a block and more, each with its dwells: two at a time, or one."""
+    """Reductions of the deviance by two and more jumps of a block, with the dwells of the jumps; added greedily in pairs."""
     n = space.q.shape[1]
     dwells, blocks = np.arange(1, n), np.array([block])
     steps = (np.arange(n)[:, None] >= dwells).astype(np.float64)[None]
@@ -166,7 +166,7 @@ def _several(space: Space, block: int) -> Iterator[tuple[float, list[int]]]:
 
 
 def _next_two(gram: Array, along: Array, chosen: list[int]) -> list[int]:
-    """The two columns that reduce most beside those that are chosen."""
+    """Indices of the two columns that reduce the sum of squares most beside the chosen ones."""
     if chosen:
         beside = np.linalg.lstsq(gram[np.ix_(chosen, chosen)], gram[chosen], rcond=1e-8)[0]
         gram, along = gram - gram[:, chosen] @ beside, along - beside.T @ along[chosen]

@@ -1,16 +1,16 @@
-"""Error and log density of a model on dwells left out, predicted with the noise that correlates them with the others.
+"""Cross-validation: error and log density of a model on dwells left out, with the noise that correlates them with the others.
 
-With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ of all dwells, those of a fold B deviate by (P_BB)⁻¹(Py)_B, with covariance (P_BB)⁻¹: the
-prediction from all others, with wander and the errors of the coefficients, without a second fit. Ordinary least squares on the
-other dwells is biased under wander: both sides of a fold share it, and every slow effect is confirmed.
+With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ of all dwells, the residuals of a fold B left out are (P_BB)⁻¹(Py)_B, with covariance (P_BB)⁻¹:
+the prediction from all other dwells, including wander and the errors of the coefficients, without a second fit. Ordinary least
+squares on the other dwells is biased under wander: both sides of a fold share it, so that every slow effect would be confirmed.
 
-Handling errors of the run (a unit moved, the table slipped) are facts of this run and no part of the model: they keep the
-coefficients of all dwells in every fold, as corrections of the readings do. Without that a fold on one side of a change would
-extrapolate it. The term that is judged is predicted by the other dwells alone, also where it is a handling error.
+Handling errors (a unit moved, the table slipped) belong to this run and not to the model: in every fold they keep the
+coefficients fitted to all dwells, like corrections of the readings. Otherwise a fold on one side of a change would extrapolate
+it. The term that is judged is predicted from the other dwells alone, also where it is a handling error.
 
-The state of a memory before the first dwell is a fact of the run, too, and shows in few dwells, often in the first alone. The
-dwells of a fold that alone determine it are fitted in that fold, with and without the effect; all others are left out: their
-outputs, not the path of poses and temperatures through them, which is known.
+The state of a memory before the first dwell also belongs to the run, and affects few dwells, often only the first. Dwells of a
+fold that alone determine it are fitted in that fold, with and without the effect. Of all other dwells of a fold the outputs are
+left out, but not the sequence of poses and temperatures, which is known.
 """
 
 from collections.abc import Iterable, Sequence
@@ -37,22 +37,22 @@ Kind = Literal["poses", "soaks", "blocks of time"]
 _POSES = 6
 
 _UNDETERMINED = 1e-7
-"""Smallest eigenvalue of P of the dwells left out, over the largest, at which the other dwells do not determine the model."""
+"""Ratio of the eigenvalues of P_BB, smallest over largest, below which the other dwells do not determine the model."""
 
 _SURELY = 1e-4
-"""Lower bound of that ratio above which the eigenvalues of no block need be looked at."""
+"""Lower bound of that ratio above which the eigenvalues of the single blocks need not be computed."""
 
 _ALONE = 0.9
-"""Share of the sum of squares of a column in one fold, from which on the other dwells do not determine its coefficient."""
+"""Share of a column's sum of squares in one fold above which the other dwells do not determine its coefficient."""
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A model on dwells left out, by kind of fold.
+    """Prediction errors of a model on dwells left out, by kind of fold.
 
-    missed : by kind, (blocks, n) g, NaN where a dwell is missing, its fold cannot judge the model, or it determines the state
-        of a memory before the first dwell
-    density : by kind, log density of what was left out; kinds with a fold that cannot judge the model are omitted
+    missed : by kind, (blocks, n), g, prediction errors; NaN where a dwell is missing, where its fold cannot judge the model, or
+        where it determines a memory's initial state
+    density : by kind, log predictive density; kinds with a fold that cannot judge the model are omitted
     """
 
     missed: dict[Kind, Array]
@@ -65,24 +65,24 @@ class LeftOut:
 
 
 def left_out(model: Model, judged: Term | None = None, also: Sequence[Term] = ()) -> LeftOut:
-    """The prediction of dwells left out: poses in six folds, soaks one by one, six stretches of time.
+    """Cross-validation of a model with three kinds of folds: poses in six folds, each soak, six intervals of time.
 
     Parameters
     ----------
-    judged : the term that is judged; the other handling errors of the model have their coefficients of all dwells
-    also : terms of the models that this one is compared with: the same dwells are left out for all
+    judged : the term that is judged; other handling errors keep the coefficients fitted to all dwells
+    also : terms of models that are compared with this one, so that the same dwells are left out for all
     """
     if model.problem.n > LONGEST:
         return _without_wander(model, judged)
-    parts = _Parts(model, judged)
-    begun = _begun(model.problem, {term.key: term for term in (*model.terms, *also)}.values())
+    parts = _Projector(model, judged)
+    begun = _initial_state_columns(model.problem, {term.key: term for term in (*model.terms, *also)}.values())
     missed: dict[Kind, Array] = {}
     density: dict[Kind, float] = {}
     for kind, fold in _folds(model.problem).items():
         residuals = np.full((model.problem.blocks, model.problem.n), np.nan)
         total, sound = 0.0, True
         for k in range(int(fold.max()) + 1):
-            out = (fold == k) & ~_alone(begun, fold == k)
+            out = (fold == k) & ~_determining(begun, fold == k)
             predicted = parts.predicted(out)
             sound &= predicted is not None
             if predicted is not None:
@@ -93,23 +93,23 @@ def left_out(model: Model, judged: Term | None = None, also: Sequence[Term] = ()
     return LeftOut(missed, density)
 
 
-def _begun(problem: Problem, terms: Iterable[Term]) -> Array:
-    """Columns (n, k) of the states of memories before the first dwell, each of unit length; of every block."""
+def _initial_state_columns(problem: Problem, terms: Iterable[Term]) -> Array:
+    """Unit-length columns (n, k) of the initial states of all memories, those of all blocks side by side."""
     flat = [np.moveaxis(t.start(problem), 1, 0).reshape(problem.n, -1) for t in terms]
     joined = np.concatenate([np.zeros((problem.n, 0)), *flat], axis=1)
     size = np.linalg.norm(joined, axis=0)
     return joined[:, size > 0.0] / size[size > 0.0]
 
 
-def _alone(begun: Array, fold: Flags) -> Flags:
-    """Dwells (n,) of a fold that alone determine a column (n, k) of unit length."""
+def _determining(begun: Array, fold: Flags) -> Flags:
+    """Whether each dwell (n,) is in the fold and needed to determine one of the unit-length columns (n, k)."""
     inside = np.where(fold[:, None], begun, 0.0)
     within = inside[:, np.sum(inside**2, axis=0) > _ALONE]
     return np.any(within**2 > (1.0 - _ALONE) / len(fold), axis=1)
 
 
 def _without_wander(model: Model, judged: Term | None) -> LeftOut:
-    """Poses left out by weighted least squares: for records so long that wander is not modelled."""
+    """Cross-validation over poses by weighted least squares, for records too long for a model of wander."""
     problem = model.problem
     fold = _by_pose(problem)
     residuals = np.full((problem.blocks, problem.n), np.nan)
@@ -124,20 +124,20 @@ def _without_wander(model: Model, judged: Term | None) -> LeftOut:
 
 
 def _keeps(term: Term, judged: Term | None) -> bool:
-    """Whether a term keeps its coefficients of all dwells: a handling error, unless it is judged itself."""
+    """Whether a term keeps the coefficients fitted to all dwells: a handling error, unless it is the judged term."""
     return isinstance(term.effect, Handling) and (judged is None or term.key != judged.key)
 
 
 def _fixed(model: Model, judged: Term | None) -> Flags:
-    """The shared columns (q,) of a model that keep their coefficients."""
+    """Whether each shared column (q,) of a model keeps its coefficient."""
     keeps = np.zeros(model.shared.shape[-1], dtype=bool)
     for term, columns in model.slices(shared=True):
         keeps[columns] = _keeps(term, judged)
     return keeps
 
 
-class _Parts:
-    """The matrix P of every block, by the blocks that share a whitener, and its change by columns that all blocks share."""
+class _Projector:
+    """The matrix P of every block, for groups of blocks that share a whitener, and its change by shared columns."""
 
     def __init__(self, model: Model, judged: Term | None) -> None:
         space = model.space
@@ -161,7 +161,7 @@ class _Parts:
         ]
 
     def predicted(self, out: Flags) -> tuple[Array, float] | None:
-        """Deviations (blocks, k) of the dwells ``out`` (n,) from their prediction, and their log density; None if undefined."""
+        """Prediction errors (blocks, k), g, of the k dwells in ``out`` (n,), and their log density; None if undefined."""
         missed = np.full((self.blocks, int(out.sum())), np.nan)
         density = 0.0
         inner = self.inner.copy()
@@ -184,7 +184,7 @@ class _Parts:
             values, vectors = np.linalg.eigh(inner)
             if values[0] <= 1e-9 * max(float(np.trace(self.inner)), 1e-300):
                 return None
-            # errors of the shared coefficients, as the other dwells determine them, in the prediction
+            # adds the errors of the shared coefficients, estimated from the other dwells, to the prediction error
             half = vectors / np.sqrt(values)
             if any(fold.is_blind(np.mean(np.sum((fold.across @ half) ** 2, axis=-1), axis=-1)) for *_, fold in held):
                 return None
@@ -199,10 +199,10 @@ class _Parts:
 
 @dataclass(frozen=True)
 class _Fold:
-    """Dwells left out of blocks that share a whitener, predicted with the shared coefficients of all dwells.
+    """A fold of dwells left out of blocks that share a whitener, predicted with the shared coefficients of all dwells.
 
-    off : (b, k), (P_BB)⁻¹(Py)_B, g; across : (b, k, q), (P_BB)⁻¹(Pz)_B, g; log_det : sum of log|P_BB|
-    expected : (b,), g², variance of a prediction; enough : (b,), g², variance from which on it tells nothing
+    off : (b, k), g, (P_BB)⁻¹(Py)_B; across : (b, k, q), (P_BB)⁻¹(Pz)_B; log_det : sum of log|P_BB|
+    expected : (b,), g², variance of a prediction; enough : (b,), g², variance from which on a prediction is useless
     """
 
     off: Array
@@ -212,17 +212,17 @@ class _Fold:
     enough: Array
 
     def is_blind(self, more: Array | float = 0.0) -> bool:
-        """Whether the other dwells determine the prediction of some block too little, with ``more`` (b,) variance, g²."""
+        """Whether the prediction of any block is useless, with ``more`` (b,), g², added to its variance."""
         return not bool(np.all(self.expected + more < self.enough))
 
 
 @dataclass
 class _Group:
-    """P of blocks that share a whitener, in whose units P is S − AᵀA with S = V⁻¹ of all and the few rows A of each.
+    """P of blocks that share a whitener: in units of their level P = S − AᵀA, with a common S = V⁻¹ and few rows A per block.
 
-    there : (n,), dwells; whitener : (n, n)
-    along : (b, r, n), A; level : (b,), g; py : (b, n), pz : (b, n, q), P times the measurements and shared columns, 1/g
-    local : (b, n, p), columns with coefficients by block
+    members : (b,), blocks; there : (n,), whether a dwell is present; whitener : (n, n)
+    along : (b, r, n), A; level : (b,), g; py : (b, n), pz : (b, n, q), P times the measurements and the shared columns, 1/g
+    local : (b, n, p), g per unit of the coefficient, columns with coefficients by block
     """
 
     members: Places
@@ -236,12 +236,12 @@ class _Group:
 
     @cached_property
     def inverse(self) -> Array:
-        """V⁻¹ of all dwells, (n, n)."""
+        """V⁻¹ of all dwells in units of the level, (n, n)."""
         return self.whitener.T @ self.whitener
 
     @cached_property
     def typical(self) -> Array:
-        """Variance of what the model leaves of each block, (b,): nothing that it predicts should be much worse."""
+        """Expected residual variance of each block, (b,), g²: a useful prediction is not much worse."""
         measured = np.flatnonzero(self.there)
         root = solve_triangular(self.whitener[np.ix_(measured, measured)], np.eye(measured.size), lower=True)
         # P⁺ = (I − UUᵀ)V(I − UUᵀ) with an orthonormal basis U of the columns
@@ -250,7 +250,7 @@ class _Group:
         return self.level**2 * (np.sum(root**2) - inside) / np.maximum(measured.size - rank, 1)
 
     def left_out(self, dwells: Places) -> _Fold | None:
-        """The fold of some dwells (k,); None if the others determine too little.
+        """The fold of some dwells (k,); None if the other dwells do not determine its prediction.
 
         (S − AᵀA)⁻¹ = S⁻¹ + S⁻¹Aᵀ(I − AS⁻¹Aᵀ)⁻¹AS⁻¹: one inverse for all blocks, and a small one for each.
         """
@@ -295,7 +295,7 @@ def _folds(problem: Problem) -> dict[Kind, Places]:
 
 
 def _by_pose(problem: Problem) -> Places:
-    """Equal poses together; dwells in turn if no pose is repeated."""
+    """Fold (n,) of each dwell, equal poses in the same fold; dwells in turn if there are too few poses."""
     pose = poses(problem.lot)
     if pose.max() + 1 < 2 * _POSES:
         return np.arange(problem.n) % min(_POSES, problem.n)

@@ -1,4 +1,4 @@
-"""The part of a lot in which effects are searched, and the curves that are suspected in it."""
+"""The sample of a lot in which effects are searched, and the curves that are suspected in it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,9 +24,9 @@ _ENOUGH = 24  # units, distributed over a larger lot, that are searched
 
 @dataclass(frozen=True)
 class LotPart:
-    """The part of a lot that the search for effects needs: effects common to a large lot are visible in two dozen units.
+    """The units of a lot in which effects are searched: effects common to a large lot are visible in two dozen units.
 
-    wide : whether curves of every kind are suspected from the first
+    wide : whether curves of every kind are suspected from the beginning
     """
 
     field: Candidates
@@ -34,7 +34,7 @@ class LotPart:
     wide: bool = False
 
     def suspected(self, chosen: Sequence[Term]) -> list[Driver]:
-        """Curves of every driver; of every kind beside many effects, or where a drift had looked like sudden changes."""
+        """Suspected curves of every driver; of every kind with many chosen effects, or where a drift imitated sudden changes."""
         return self.every_suspect if self.wide or len(chosen) >= _MANY_EFFECTS else self._plain
 
     @cached_property
@@ -47,7 +47,7 @@ class LotPart:
         return [*self._plain, *wide_suspects(self.field.problem)]
 
     def imitates(self, chosen: Sequence[Term]) -> bool:
-        """Whether a curve of one driver is better than the chosen effects: by far, or with no further effect left."""
+        """Whether chosen effects only imitate a curve of one driver: it is far better, or leaves no further effect."""
         better = better_curve(self.base, chosen, self.suspected(chosen))
         if better is None:
             return False
@@ -58,11 +58,11 @@ class LotPart:
         return by_far or not anything(self.field, fit.model)
 
     def drift_of(self, changes: Sequence[Term], further: Sequence[Term]) -> tuple[Unexplained, frozenset[str]] | None:
-        """The drift that sudden changes, with what was found beside them, are pieces of, and the ids of these changes.
+        """The drift that sudden changes imitate together with further terms, and the ids of these changes; None if there is none.
 
-        One step of the reader's reference is an event. Two of them, one after the other, are what a scale factor that changes
-        slowly looks like; a fixture that moved, and misalignments that follow the temperature, are what a fixture that bends
-        looks like. A single change is never doubted: known causes have priority.
+        One step of the reader's reference is an event, but a slowly changing scale factor looks like two successive steps, and a
+        bending fixture looks like a moved fixture with temperature-dependent misalignments. A single change is never doubted,
+        because known causes have priority.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class LotPart:
 
 
 def part_of(field: Candidates, base: Model, *, wide: bool) -> LotPart:
-    """Some units of a large lot, without those that have a handling error of their own in the model; a small lot as a whole."""
+    """A sample of the units of a large lot, without units with a handling error of their own; a small lot completely."""
     lot = field.problem.lot
     count = lot.state.time.shape[0]
     if count <= _MANY:

@@ -1,6 +1,6 @@
-"""Noise drawn from a model's covariance, each draw with shares and variances of its own, and how badly it fits somewhere.
+"""Simulated noise of a model's covariance: smallest p-value of each draw, with shares and variances estimated from the draw.
 
-A draw is worked on as rows, (blocks, draws, n): some blocks at a time fit the cache, and no series is turned round.
+Draws are stored as rows, (blocks, draws, n), so that groups of blocks fit into the cache and no series is transposed.
 """
 
 from collections.abc import Iterable, Mapping
@@ -24,18 +24,18 @@ _PIECE = 150_000
 """Largest number of values worked on at a time."""
 
 _KEPT = 3_200_000
-"""Largest number of values of bases that are stored for further draws."""
+"""Largest number of matrix elements of bases that are stored for further draws."""
 
 _OFF = (-8, -4, 0, 4, 8)
-"""Eighths of a decade about the fitted shares within which the noise of a draw is estimated."""
+"""Offsets from the fitted shares, in eighths of a decade, at which the noise of a draw is estimated."""
 
 
 @dataclass(frozen=True)
 class _Basis:
-    """What the columns of a model span at some shares.
+    """Orthonormal basis of a model's whitened columns at given shares.
 
-    q : (blocks, n, p), orthonormal, whitened; by_block : (blocks,), degrees of freedom, together ``dof``
-    determinants : logarithms of those of the covariance and of the information
+    q : (blocks, n, p), basis; by_block : (blocks,), residual degrees of freedom, with sum ``dof``
+    determinants : sum of the log-determinants of covariance and information
     """
 
     shares: Shares
@@ -46,16 +46,16 @@ class _Basis:
 
 
 class NoiseDraws:
-    """Draws of the noise of a model; of the model's own residuals in random order where their tails are heavy.
+    """Draws of a model's noise: normal, or the model's residuals resampled where their tails are heavy.
 
     Parameters
     ----------
-    rng : the same draws for the same generator, however many are worked on at a time
+    rng : generator; the draws do not depend on how many are processed at a time
     """
 
     def __init__(self, model: Model, rng: Generator) -> None:
         self.model, self.rng = model, rng
-        self.lattice, self.start = _lattice(model.noise.shares)
+        self.lattice, self.start = _lattice_around(model.noise.shares)
         left = model.space.residual[model.problem.covariance.there]
         self.heavy = heavy(left)
         self._values = left / np.sqrt(np.mean(left**2))
@@ -64,12 +64,12 @@ class NoiseDraws:
         self._states: list[Mapping[str, object]] = []
 
     def worst(self, looks: Iterable[Candidate], count: int, batches: int = 1) -> Array:
-        """Smallest log p over all tests of each of so many further draws, (batches, count).
+        """Smallest log p-value over all tests, for each of ``count`` further draws per batch, (batches, count).
 
         Parameters
         ----------
         looks : the tests, the same for all draws
-        batches : that are drawn one after the other, and worked on together
+        batches : number of batches, drawn one after the other and processed together
         """
         rows = self._drawn(count, batches)
         count *= batches
@@ -80,7 +80,7 @@ class NoiseDraws:
         points, first = np.unique(chosen[order], return_index=True)
         groups = [slice(a, b) for a, b in zip(first, [*first[1:], count], strict=True)]
         total = np.concatenate(
-            [self._left(rows, point, draws) for point, draws in zip(points.tolist(), groups, strict=True)]
+            [self._residual_squares(rows, point, draws) for point, draws in zip(points.tolist(), groups, strict=True)]
         )
         dof = {point: self._basis(point).dof for point in points.tolist()}
         worst, spaces = np.zeros(count), dict[int, Space]()
@@ -102,7 +102,7 @@ class NoiseDraws:
         return drawn.reshape(batches, -1)
 
     def keep(self, batches: int) -> None:
-        """Go on as if only the first batches of the last draws had been drawn."""
+        """Reset the generator to its state after the first ``batches`` of the last call."""
         self.rng.bit_generator.state = self._states[batches - 1]
 
     def _drawn(self, count: int, batches: int) -> Array:
@@ -126,7 +126,7 @@ class NoiseDraws:
         return shares_at((flicker[point // len(walk)], walk[point % len(walk)]), self.model.noise.shares.by_block)
 
     def _basis(self, point: int) -> _Basis:
-        """What the columns of the model span at the shares of a point of the lattice."""
+        """The basis of the model's columns at the shares of a point of the lattice."""
         if point not in self._bases:
             shares = self._shares(point)
             space = self.model.at(Noise(shares, np.ones(self.model.problem.blocks)))
@@ -138,10 +138,7 @@ class NoiseDraws:
         return self._bases[point]
 
     def _estimated(self, rows: Array) -> Places:
-        """The point of the lattice with the smallest restricted deviance of each draw, (draws,).
-
-        Descent from the shares that the draws were made with, by the points about the best of each draw.
-        """
+        """Lattice point of smallest restricted deviance for each draw, (draws,), by descent from the shares that generated it."""
         across, columns = (len(each) for each in self.lattice)
         deviances = np.full((across * columns, rows.shape[1]), np.inf)
         done = np.zeros(deviances.shape, dtype=bool)
@@ -162,7 +159,7 @@ class NoiseDraws:
             best = np.argmin(deviances, axis=0)
 
     def _deviances(self, basis: _Basis, rows: Array, draws: Places) -> Array:
-        """Restricted deviance of some draws at some shares, (draws,), each block with its own variance."""
+        """Restricted deviance of some draws at the shares of a basis, (draws,), each block with its own variance."""
         covariance = self.model.problem.covariance
         log_squares = np.zeros(draws.size)
         for some in _some_blocks(rows):
@@ -173,10 +170,10 @@ class NoiseDraws:
             log_squares += basis.by_block[some] @ np.log(np.maximum(squares, 1e-300))
         return basis.determinants + log_squares
 
-    def _left(self, rows: Array, point: int, draws: slice) -> Array:
-        """Sums of squares (draws,) of what the model leaves of draws with equal shares, over their estimated variances.
+    def _residual_squares(self, rows: Array, point: int, draws: slice) -> Array:
+        """Residual sums of squares (draws,) of draws with equal shares, over their estimated variances.
 
-        The draws are overwritten by the rows that give their products with columns in g.
+        ``rows`` of these draws are overwritten: their products with columns in g are then those with the whitened residuals.
         """
         covariance, noise, basis = self.model.problem.covariance, self.model.noise, self._basis(point)
         scale = covariance.level * noise.scale
@@ -190,7 +187,7 @@ class NoiseDraws:
             rows[some, draws] = covariance.back(left, basis.shares, np.arange(len(rows))[some])
         dof = basis.by_block[:, None]
         if np.isfinite(noise.prior):
-            # the centre of the prior is one in units of the fitted scale
+            # in units of the fitted scale the prior is centred at 1
             variance = (squares + noise.prior) / (dof + noise.prior)
         else:
             variance = np.broadcast_to(squares.sum(axis=0) / max(float(dof.sum()), 1.0), squares.shape)
@@ -200,10 +197,10 @@ class NoiseDraws:
 
 @dataclass(frozen=True)
 class Directions:
-    """Orthonormal directions of a candidate's columns after the model, for each value of its nonlinear parameters.
+    """Orthonormal directions of a candidate's columns beyond the model, for each value of its nonlinear parameters.
 
-    turn : (blocks, grid, p, p), from the products of the columns with a series to those of the directions; one block for
-        coefficients that blocks share; ranks : (grid,)
+    turn : (blocks, grid, p, p), transforms products of the columns with a series into those of the directions; one block if
+        the coefficients are shared; ranks : (grid,), number of directions
     """
 
     turn: Array
@@ -224,7 +221,7 @@ class Directions:
         return Directions(turn, (values > SEEN**2).sum(axis=(0, 2)), candidate.shared)
 
     def drops(self, along: Array) -> Array:
-        """Reduction (grid, draws) of the squares of draws, from their products (blocks, grid, p, draws) with the columns."""
+        """Reduction (grid, draws) of the sums of squares, from products (blocks, grid, p, draws) of draws and columns."""
         if self.shared:
             along = along.sum(axis=0, keepdims=True)
         if self.turn.shape[-1] == 1:
@@ -234,19 +231,19 @@ class Directions:
 
 
 def _some_blocks(rows: Array) -> list[slice]:
-    """Blocks of rows (blocks, draws, n) that are worked on together."""
+    """Slices of the blocks of ``rows`` (blocks, draws, n) that are processed together."""
     few = max(_PIECE // max(rows[0].size, 1), 1)
     return [slice(start, min(start + few, len(rows))) for start in range(0, len(rows), few)]
 
 
-def _lattice(shares: Shares) -> tuple[tuple[list[int | None], list[int | None]], int]:
-    """The lattice about fitted shares, none first, each share in rising order; and the index in it of the fitted ones."""
+def _lattice_around(shares: Shares) -> tuple[tuple[list[int | None], list[int | None]], int]:
+    """The lattice around fitted shares, for each share None and then rising indices; and the flat index of the fitted ones."""
     fitted = nearest_point(shares)
-    rows, columns = (_about(k) for k in fitted)
+    rows, columns = (_indices_around(k) for k in fitted)
     return (rows, columns), rows.index(fitted[0]) * len(columns) + columns.index(fitted[1])
 
 
-def _about(k: int | None) -> list[int | None]:
-    """A share of the lattice, its neighbours, and none."""
+def _indices_around(k: int | None) -> list[int | None]:
+    """Lattice indices at and around a share, after None for no share."""
     near = {LEAST_SHARE, LEAST_SHARE + 8} if k is None else {max(k + d, LEAST_SHARE) for d in _OFF}
     return [None, *sorted(near)]

@@ -1,9 +1,8 @@
 """Part of a predicted change that a fresh run reproduces: λ with its standard error.
 
-e0 is the error of the model without the effect on the fresh run, d the difference of the predictions of the two models. Both are
-without the part that may change from day to day (the base model's coefficients, or each unit's bias alone where the fresh run
-does not determine
-them), λ = Σ dᵀV⁻¹e0 / Σ dᵀV⁻¹d: one if the effect is real and has its fitted size, zero if it is not real.
+Let e0 be the error of the model without the effect on the fresh run, and d the difference of the predictions of the two models.
+From both, the part that may change from day to day is removed: the base model's coefficients, or only each unit's bias where the
+fresh run does not determine them. Then λ = Σ dᵀV⁻¹e0 / Σ dᵀV⁻¹d is 1 if the effect is real with its fitted size, 0 if not real.
 """
 
 from dataclasses import dataclass
@@ -22,20 +21,19 @@ from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 
 _ENOUGH = 3
-"""Fewest units, or stretches of time, whose scatter gives a standard error."""
+"""Smallest number of units, or of time intervals, whose scatter gives a standard error."""
 
 _SPARE = 2.0
-"""Dwells per coefficient of the base model that a fresh run needs to determine it again."""
+"""Dwells per coefficient of the base model that a fresh run needs to estimate it again."""
 
 
 @dataclass(frozen=True)
 class ReproducedChange:
-    """Evidence of a fresh run on an effect.
+    """Evidence of a fresh run for or against an effect.
 
-    part : λ; error : of it, one standard deviation
-    before, after : RMS errors of the models, g, without the part that may change from day to day; fall_error : of their
-    difference
-    again : the part that was estimated again, "base" or "bias"
+    part : λ; error : its standard error
+    before, after : g, RMS errors of the models without and with the effect, without the part that may change from day to day
+    fall_error : g, standard error of their difference; again : the part that was estimated again, "base" or "bias"
     """
 
     part: float
@@ -61,11 +59,11 @@ class ReproducedChange:
 
 
 def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> ReproducedChange:
-    """The part of a predicted change that the fresh run reproduces.
+    """The part of a predicted change that a fresh run reproduces.
 
     Parameters
     ----------
-    lot : the fresh run, in the scale of the first
+    lot : the fresh run, in units of the first run's scale factors
     before, after : the models without and with the effect, fitted to the first run
     """
     model = Model(Problem(lot), after.terms)
@@ -80,7 +78,7 @@ def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> Reproduced
         problem.covariance, noise, left * zero, base.local, np.concatenate([base.shared, change[..., None]], axis=-1)
     )
     shared = space.gram[1:, 1:]
-    # columns shared by all that are estimated again come first, the change last: its coefficient is λ
+    # order of the shared columns: those estimated again, then the change, whose coefficient is λ
     squares = float(shared[-1, -1])
     along = float(space.gram[-1, 0])
     if shared.shape[0] > 1:
@@ -88,15 +86,15 @@ def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> Reproduced
         along -= float(shared[-1, :-1] @ rest @ space.gram[1:-1, 0])
         squares -= float(shared[-1, :-1] @ rest @ shared[:-1, -1])
     if squares <= 1e-9 * max(float(np.sum(space.whiten(change[..., None]) ** 2)), 1e-300):
-        return ReproducedChange(float("nan"), float("nan"), *_falls(problem, base, left, change), again)
-    wide = _together(Model(problem, after.terms, near=noise), space.targets[..., -1])
+        return ReproducedChange(float("nan"), float("nan"), *_rms_before_and_after(problem, base, left, change), again)
+    wide = _common_noise_factor(Model(problem, after.terms, near=noise), space.targets[..., -1])
     return ReproducedChange(
-        along / squares, float(np.sqrt(wide / squares)), *_falls(problem, base, left, change), again
+        along / squares, float(np.sqrt(wide / squares)), *_rms_before_and_after(problem, base, left, change), again
     )
 
 
 def _base(problem: Problem, terms: tuple[Term, ...]) -> tuple[Model, str]:
-    """The part estimated again: the whole base model if the fresh run determines it, else only the bias."""
+    """The part estimated again and its name: the complete base model if the fresh run determines it, else only the bias."""
     base = Model(problem, [t for t in terms if t.first is None])
     space = base.at(problem.covariance.white_noise())
     columns = base.local.shape[-1]
@@ -107,16 +105,16 @@ def _base(problem: Problem, terms: tuple[Term, ...]) -> tuple[Model, str]:
 
 
 def without_own_bias(problem: Problem, terms: tuple[Term, ...], left: Array) -> Array:
-    """Residuals (blocks, n), g, less the bias that a run has of its own: devices come up elsewhere after a switch-on."""
-    return np.where(np.isfinite(left), _own_out(problem, _bias(problem, terms), np.nan_to_num(left)), np.nan)
+    """Residuals (blocks, n), g, less the bias of each block in this run: it changes with every switch-on."""
+    return np.where(np.isfinite(left), _fit_residuals(problem, _bias(problem, terms), np.nan_to_num(left)), np.nan)
 
 
 def _bias(problem: Problem, terms: tuple[Term, ...]) -> Model:
     return Model(problem, [t for t in terms if t.effect.id == "bias"])
 
 
-def _together(model: Model, change: Array) -> float:
-    """Factor on the variance of λ if the units share noise and the change is common to them."""
+def _common_noise_factor(model: Model, change: Array) -> float:
+    """Factor on the variance of λ for noise that the units share, by the part of the change that is common to them."""
     units = model.problem.lot.state.time.shape[0]
     if units < 2 or model.problem.lot.radial:
         return 1.0
@@ -125,10 +123,10 @@ def _together(model: Model, change: Array) -> float:
     return 1.0 + alike * (shared_noise(model) - 1.0)
 
 
-def _falls(problem: Problem, base: Model, left: Array, change: Array) -> tuple[float, float, float]:
-    """RMS before and after, and the standard error of their difference over units and stretches of time."""
+def _rms_before_and_after(problem: Problem, base: Model, left: Array, change: Array) -> tuple[float, float, float]:
+    """RMS, g, before and after, and the standard error of their difference: the larger jackknife over units and intervals."""
     there = np.isfinite(problem.error)
-    ends = [_own_out(problem, base, series)[..., None] for series in (left, left - change)]
+    ends = [_fit_residuals(problem, base, series)[..., None] for series in (left, left - change)]
     both = np.where(there[..., None], np.concatenate(ends, axis=-1), 0.0) ** 2
     units = problem.lot.state.time.shape[0]
     stretch = np.arange(problem.n) * min(BLOCKS, problem.n) // problem.n
@@ -142,8 +140,8 @@ def _falls(problem: Problem, base: Model, left: Array, change: Array) -> tuple[f
     return before, after, float(np.max(spread)) if spread else float("nan")
 
 
-def _own_out(problem: Problem, base: Model, series: Array) -> Array:
-    """Series (blocks, n), g, without the part that the base model explains by ordinary least squares."""
+def _fit_residuals(problem: Problem, base: Model, series: Array) -> Array:
+    """Residuals (blocks, n), g, of series after an ordinary least-squares fit of the base model's local columns."""
     level = problem.covariance.level[:, None]
     local = np.where(np.isfinite(problem.error)[..., None], base.local, 0.0) / level[..., None]
     if not local.shape[-1]:
@@ -155,7 +153,7 @@ def _own_out(problem: Problem, base: Model, series: Array) -> Array:
 
 
 def _jackknife(parts: Array) -> float:
-    """Standard error of the decrease, parts (k, 3) of squares before, after and counts left out in turn."""
+    """Jackknife standard error, g, of the decrease of the RMS; ``parts`` (k, 3): squares before and after, counts."""
     total = parts.sum(axis=0)
     rest = np.maximum(total - parts, 0.0)
     falls = np.sqrt(rest[:, 0] / np.maximum(rest[:, 2], 1.0)) - np.sqrt(rest[:, 1] / np.maximum(rest[:, 2], 1.0))

@@ -1,4 +1,4 @@
-"""The search for missing effects: forward with the noise estimated again, then backward over the chosen effects."""
+"""The search for missing effects: forward selection with the noise estimated again, then backward over the chosen effects."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -21,19 +21,20 @@ from inertial.estimation.term import Term
 from inertial.probability import log_chi2_tail
 
 _FINALISTS = 5  # finalists at each noise, for which the noise is estimated again
-_AGAIN = 3  # finalists of the second examination of an effect
+_AGAIN = 3  # finalists at each noise when a chosen effect is examined again
 _MOST = 6  # largest number of effects of one search
-_AS_MUCH = 1.0  # score by which further columns of an effect must be better than its leading column
-_INEXACT = 0.01  # share of a wrong angle that the scale factors and misalignments of the devices leave of it
-_REFINED, _UNCHANGED = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
-_GAINED = 3.0  # factor on the logarithm of a probability that refinement gains at the most
+_AS_MUCH = 1.0  # score by which all columns of an effect must be better than its leading columns alone
+_INEXACT = 0.01  # share of a wrong angle that differs between devices, by their scale factors and misalignments
+_REFINED, _UNCHANGED = 3, 0.05  # largest number of refinements; relative change of a parameter that ends them
+_GAINED = 3.0  # largest factor on a log probability that refinement gains
 
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Outcome of the search: the model with the added effects, and the rivals of the first step, best first.
+    """Outcome of the search.
 
-    handling : the alternatives that ended the search, because they were the best of its step; ``model`` is the model before them
+    model : with the added effects; added : their terms; ladder : the rivals of the first step, best first
+    handling : handling errors that were best in the last step and ended the search; they are not in ``model``
     """
 
     model: Model
@@ -52,8 +53,8 @@ def search(
 
     Parameters
     ----------
-    stop : called before the third and every further effect: whether the chosen ones only imitate another cause
-    start : effects that a part of the lot required already
+    stop : called from the third effect on: whether the chosen effects only imitate another cause
+    start : effects already found in a sample of the lot's units
     """
     chosen: list[Term] = list(start)
     model, ladder = Model(field.problem, [*base.terms, *chosen], near=base.noise) if chosen else base, ()
@@ -69,7 +70,7 @@ def search(
         if jumps is not None and jumps.ahead > 0.0:
             return SearchResult(model, tuple(chosen), ladder, jumps.terms)
         best = _parent_first(field, model, best)
-        widened = _widened(field, model, best, chosen)
+        widened = _with_complete_form(field, model, best, chosen)
         if widened is not None:
             chosen = widened
             model = Model(field.problem, [*base.terms, *chosen], near=model.noise)
@@ -86,7 +87,7 @@ def search(
 
 
 def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:
-    """The lower-order effect that a rival is built on, if it is missing and significant by itself; else the rival."""
+    """The lower-order effect that a rival presupposes, if it is missing and significant alone; else the rival."""
     held = {t.effect.id for t in model.terms}
     for effect in field.effects:
         if effect.id in rival.term.effect.after and effect.id not in held:
@@ -96,10 +97,10 @@ def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:
     return rival
 
 
-def _widened(field: Candidates, model: Model, rival: Rival, chosen: Sequence[Term]) -> list[Term] | None:
-    """The chosen effects with one of them in its complete form, where that explains as much as a further effect; else None.
+def _with_complete_form(field: Candidates, model: Model, rival: Rival, chosen: Sequence[Term]) -> list[Term] | None:
+    """The chosen effects with one in its complete form, if that explains as much as adding the rival; else None.
 
-    The simpler form of an effect with memory leaves a remainder, which would be found as another effect.
+    The simpler form of an effect with memory leaves a residual, which would be found as another effect.
     """
     simpler = [term for term in chosen if term.memory and term.first is not None]
     if not simpler:
@@ -138,14 +139,14 @@ def evident(field: Candidates, rival: Rival) -> bool:
 
 
 def size_of(model: Model, term: Term) -> float:
-    """RMS, g, over all dwells of the part of a term that the model cannot absorb, less that of noise."""
+    """RMS, g, over all dwells, of the part of a term beyond the model, less that expected from noise."""
     return model.explained(term.candidate(model.problem), model.with_term(term).scatter())
 
 
 def is_remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
-    """Whether a handling error explains no more than the remainder of effects of inexact shape.
+    """Whether a handling error explains no more than residuals left by chosen effects of inexact shape.
 
-    Effects without a nonlinear parameter or a memory have the shape that their equation gives, and leave nothing over.
+    Effects without nonlinear parameter and memory have exactly the shape of their equation and leave no such residuals.
     """
     inexact = [t for t in chosen if not isinstance(t.effect, Handling) and (t.effect.memory or t.effect.nonlinear)]
     if not inexact or not isinstance(rival.term.effect, Handling):
@@ -155,7 +156,7 @@ def is_remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
 
 
 def size_where_it_acts(model: Model, term: Term) -> float:
-    """RMS, g, of a term over the dwells that it changes: an error of one dwell is not diluted by the others."""
+    """RMS, g, of a term; of a handling error only over the dwells that it changes, not diluted by the others."""
     size = size_of(model, term)
     if not isinstance(term.effect, Handling):
         return size
@@ -165,27 +166,26 @@ def size_where_it_acts(model: Model, term: Term) -> float:
 
 
 def contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
-    """Rivals, best first: those that are best at the model's noise, with less wander or none, each then with its own noise."""
+    """Rivals, best first: the best candidates at the model's noise, at less wander and at none, each then at its own noise."""
     leave = {*(t.effect.id for t in model.terms if not isinstance(t.effect, Handling)), barred}
     chosen: dict[str, Term] = {}
     noise = model.noise
     less = noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
     others = [noise] if less == noise.shares else [noise, model.noise_at(less)]
     if noise.shares.walk:
-        # what a few dwells have of a drift can be a walk from end to end: without any wander the drift is seen
+        # in a few dwells a random walk can absorb a drift completely: without any wander the drift is visible
         others.append(model.noise_at(noise.shares.times(0.0, 0.0)))
     for looked in scanned(field, [model.at(other) for other in others], leave):
         for term, _ in looked[:finalists]:
             chosen.setdefault(term.effect.id, term)
-    return ranked([_judged_as_far(field, model, term) for term in chosen.values()])
+    return ranked([_judged_if_hopeful(field, model, term) for term in chosen.values()])
 
 
-def _judged_as_far(field: Candidates, model: Model, term: Term) -> Rival:
-    """A term added to a model, with refined nonlinear parameters where they can make it significant.
+def _judged_if_hopeful(field: Candidates, model: Model, term: Term) -> Rival:
+    """A term added to a model, with nonlinear parameters refined if that can make it significant.
 
-    In lots with hidden effects refined parameters gained 2.6 times the logarithm of the probability at the most (a ladder of
-    converter steps), else 1.04 times. To refine what noise explains would take a third of
-    the time of a large lot.
+    In lots with hidden effects refinement multiplied the log probability by at most 2.6 (for converter steps), else by 1.04.
+    Refining candidates that noise explains would take a third of the time of a large lot.
     """
     first = judge(field, model, term)
     hopeless = _GAINED * first.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
@@ -193,7 +193,7 @@ def _judged_as_far(field: Candidates, model: Model, term: Term) -> Rival:
 
 
 def scanned(field: Candidates, spaces: Sequence[Space], leave: set[str]) -> list[list[tuple[Term, float]]]:
-    """For each noise candidates at their best grid value with their scores, best first; without those below their price."""
+    """For each space the candidates at their best grid values with scores, best first; without those below their price."""
     complete, leading = field.gains(spaces, leave, handling=True), field.gains(spaces, leave, primary=True)
     return [_best_first(field, *each) for each in zip(spaces, complete, leading, strict=True)]
 
@@ -206,7 +206,7 @@ def _best_first(
     for primary, gains in ((False, complete), (True, leading)):
         for name, gain in gains.items():
             score, point = _best_of(field, space, name, gain)
-            # fewer columns that explain as much come first
+            # fewer columns that explain as much are preferred
             least = tried[name][0] - _AS_MUCH if name in tried else 0.0
             if score > max(least, 0.0):
                 effect = field.of(name)
@@ -229,15 +229,15 @@ def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[fl
 
 
 def judge_refined(field: Candidates, model: Model, term: Term, noise: Noise | None = None) -> Rival:
-    """A term added to a model, with refined nonlinear parameters, for each beginning of its memory.
+    """A term added to a model, with refined nonlinear parameters and the better treatment of its initial state.
 
     Parameters
     ----------
-    noise : at which it is refined; None for that of the model with the term, estimated again while a parameter moves
+    noise : noise for the refinement; None: that of the model with the term, estimated again while a parameter moves
     """
     if isinstance(term.effect, Handling):
         return judge(field, model, refine(model, term, noise or model.with_term(term).noise))
-    return min((_refined(field, model, begun, noise) for begun in _begun(model, term)), key=lambda r: r.cost)
+    return min((_refined(field, model, begun, noise) for begun in _initial_states(model, term)), key=lambda r: r.cost)
 
 
 def _refined(field: Candidates, model: Model, term: Term, noise: Noise | None) -> Rival:
@@ -246,26 +246,26 @@ def _refined(field: Candidates, model: Model, term: Term, noise: Noise | None) -
         term = refine(model, term, noise or model.with_term(term).noise)
         old, new = (np.ravel(np.array([np.mean(v) for v in t.keywords.values()])) for t in (before, term))
         if not np.any(np.abs(new - old) > _UNCHANGED * np.abs(old) + 1e-12):
-            break  # where a parameter moves, part of the effect had counted as noise, and the noise changes
+            break  # if a parameter moves, part of the effect had counted as noise, and the noise changes
     return _judged(field, model, term)
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
-    """A term added to a model, with the noise estimated again; no gain for a handling error that cannot be it."""
+    """A term added to a model, with the noise estimated again; without gain for an impossible handling error."""
     if isinstance(term.effect, Handling):
-        # it can have its size, and if of a single dwell it leaves nothing else of the dwell
+        # its size must be possible, and an error of a single dwell must explain all of that dwell
         possible = term.effect.possible(model.with_term(term).shared_sizes(term))
         if not possible or (isinstance(term.effect, OfOneDwell) and not _only_tilted(model, term)):
             return Rival(term, 0.0, 0, 0.0, 0.0)
-    return min((_judged(field, model, each) for each in _begun(model, term)), key=lambda r: r.cost)
+    return min((_judged(field, model, each) for each in _initial_states(model, term)), key=lambda r: r.cost)
 
 
 def _only_tilted(model: Model, term: Term) -> bool:
-    """Whether two wrong angles leave no more of a dwell than noise, and than their own second order.
+    """Whether two angle errors explain a dwell up to noise and their own second-order terms.
 
-    A supply that sags, or a bias of the whole lot that is up for one dwell, pushes each unit and axis by its own amount. Some of
-    it looks like two angles, and the rest of it says that it is none. The unit with the largest rest is not counted: its dwell
-    may be bad for a reason of its own.
+    A supply drop, or a bias of the complete lot that is high in one dwell, changes each unit and axis by a different amount. Part
+    of that resembles two angle errors; the residual shows that it is none. The unit with the largest residual is not counted,
+    because its dwell may be bad for another reason.
     """
     richer = model.with_term(term)
     problem = model.problem
@@ -276,12 +276,12 @@ def _only_tilted(model: Model, term: Term) -> bool:
     column = np.broadcast_to(here.astype(np.float64)[None, :, None, None], (problem.blocks, problem.n, 1, 1))
     gain = richer.space.gain(Candidate(column, shared=False))
     of_units = gain.by_block[:, 0].reshape(units, problem.per_unit).sum(axis=1)
-    # both angles are off by no more than this: their second order, and what each device makes of them
+    # bound of the residuals of true angle errors: second order, and scale factors and misalignments of each device
     angle = float(np.linalg.norm(richer.shared_sizes(term)))
     by_tilt = float(model.at(richer.noise).gain(term.candidate(problem)).drop[0])
     second = (2.0 * (0.5 * angle + _INEXACT)) ** 2 * by_tilt
     left = float(of_units.sum() - of_units.max()) - second
-    # as far beyond noise as adequacy asks for where tails are heavy, for the best of all dwells
+    # the threshold of adequacy under heavy tails, for the best of all dwells
     return left <= 0.0 or float(log_chi2_tail(left, problem.per_unit * (units - 1.0))) > np.log(
         CERTAIN_BELOW**2 / problem.n
     )
@@ -291,12 +291,12 @@ def _judged(field: Candidates, model: Model, term: Term) -> Rival:
     return Rival.of(term, likelihood_ratio(model, term, field.looks_of(term.effect.id)))
 
 
-def _begun(model: Model, term: Term) -> tuple[Term, ...]:
-    """A term, and, if it has a memory, that term without coefficients for the state of each series before the first dwell.
+def _initial_states(model: Model, term: Term) -> tuple[Term, ...]:
+    """A term and, if it has a memory, also the term without coefficients for its initial state in each series.
 
-    It is then at rest, or where the effect has a parameter for that state, as this says. Devices are at rest when a run begins,
-    as a rule. A coefficient for the state of every series would be paid for else, and an effect without memory that leaves as
-    little stands alone: a step between two soaks in place of hysteresis.
+    The initial state is then at rest, or as a parameter of the effect says. Devices are usually at rest when a run begins. With a
+    coefficient per series for the initial state, its price would favour an effect without memory that fits as well, such as a
+    step between two soaks instead of hysteresis.
     """
     if not term.memory:
         return (term,)
@@ -307,10 +307,10 @@ def _begun(model: Model, term: Term) -> tuple[Term, ...]:
 
 
 def ranked(rivals: Sequence[Rival]) -> list[Rival]:
-    """Rivals, best first, at the φ of the rival that is best with each at its own φ.
+    """Rivals, best first, all judged at the φ of the rival that is best when each has its own φ.
 
-    Two effects that are identical in the poses of a plan have equal residuals, but their φ, from medians, differ by a few per
-    cent of the deviance: each at its own φ, one of the two would be alone in its class.
+    Two effects that are identical in the poses of a plan have equal residuals, but φ, estimated from medians, changes their
+    deviances by a few per cent: each judged at its own φ, they could fall into different classes.
     """
     ordered = sorted(rivals, key=lambda r: r.cost)
     if not ordered or ordered[0].ratio is None:
@@ -322,9 +322,9 @@ def ranked(rivals: Sequence[Rival]) -> list[Rival]:
 def _reexamine(
     field: Candidates, base: Model, model: Model, chosen: list[Term]
 ) -> tuple[Model, list[Term], Term | None]:
-    """Each chosen effect again beside the others: left as it is, replaced by a better one, or removed.
+    """The model and the chosen effects after each is judged again beside the others: unchanged, replaced, or removed.
 
-    The last of what is returned is a handling error that is beyond the class of the effect whose place it takes.
+    The third result is a handling error that is better than the class of an effect and replaces it, else None.
     """
     for term in tuple(chosen):
         if len(chosen) < 2:
@@ -349,7 +349,7 @@ def _reexamine(
 
 
 def _replaced_by_two(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
-    """Each effect of several columns compared with two simpler ones that together are equivalent."""
+    """The model and the chosen effects, with effects of several columns replaced where two simpler ones cost less."""
     for term in tuple(chosen):
         columns = term.candidate(field.problem).columns.shape[-1]
         if columns < 2 or term.shared:

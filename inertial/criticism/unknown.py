@@ -1,4 +1,4 @@
-"""Effects outside the catalogue: one curve of one driver that is better than the effects that imitate it."""
+"""Effects outside the catalogue: a curve of one driver that explains a lot better than the effects that imitate it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -35,27 +35,27 @@ _KNOTS = 9  # of a smooth curve over a driver
 _TIME_KNOTS = 12  # of a curve over time
 _FEW_KNOTS = 6  # of a smooth dependence of the scale factors
 _WIDE_KNOTS = 6  # of a smooth curve of the misalignment
-_TURNED_KNOTS = 2  # of a curve of the fixture's rotation, whose every column has three coefficients of the whole lot
+_TURNED_KNOTS = 2  # of a curve of the fixture's rotation, with three coefficients of the lot per column
 _FORCE_KNOTS = 7  # of a curve over the force along an axis
 _HARMONICS = 5  # of a table angle
-_CYCLES = np.arange(1.0, 14.1, 0.5)  # of a swing within the run
-_BETWEEN = (0.125, 0.05, 0.02)  # steps of the cycles between two of them
+_CYCLES = np.arange(1.0, 14.1, 0.5)  # numbers of cycles of an oscillation over the run
+_BETWEEN = (0.125, 0.05, 0.02)  # successive steps of the number of cycles in its refinement
 _LEVELS = 14  # number of groups of values from which on a driver is continuous
 _VISITS = 1.5  # smallest mean number of visits to each level
 _CENTRES = np.linspace(0.0, 1.0, 21)  # of bumps and hinges, over the driver's range
-_WIDTHS = (0.02, 0.05, 0.1)  # of bumps, of that range
+_WIDTHS = (0.02, 0.05, 0.1)  # of bumps, as shares of that range
 _PROMISING = 6  # suspects at each noise whose curves are fitted
 _SHARPEST = 3  # suspects that are tested with bumps and hinges
 
 
 @dataclass(frozen=True)
 class Unexplained:
-    """A driver that a part of the output follows, without an effect of the catalogue that explains it.
+    """A driver that the output depends on, without an effect of the catalogue that explains the dependence.
 
-    log_p : natural logarithm of the probability that noise follows it as much
-    floor : noise of the measurement with the dependence in the model, g
-    model : that model; None where there is none
-    period : of a swing with the time, s; None of another curve
+    log_p : natural logarithm of the probability that noise shows as strong a dependence
+    part : property of the output that depends on it; model : the model with the dependence; None where there is none
+    floor : g, noise of the measurement with the dependence in the model
+    period : s, period of an oscillation in time; None for any other curve
     """
 
     driver: str
@@ -68,33 +68,33 @@ class Unexplained:
 
 
 def suspects(problem: Problem) -> list[Driver]:
-    """Every driver that varies in a lot, as columns flexible enough for any smooth dependence on it."""
+    """Every driver that varies in a lot, with columns flexible enough for any smooth dependence on it."""
     state = problem.lot.state
     suspected: list[Driver] = []
     for name, values, _ in quantities(state):
         if varies(values) and not (name == "chamber_C" and alike(values, state.temperature)):
             knots = _TIME_KNOTS if is_clock(name) else _KNOTS
             each = _unit_range(values if problem.lot.radial else np.repeat(values, problem.per_unit, axis=0))
-            suspected.append(Driver(name, _alike(problem, curve(values, knots)), each))
-            # levels in time, one for each soak, could follow any memory of temperature: a dependence on time is smooth
+            suspected.append(Driver(name, _on_every_axis(problem, curve(values, knots)), each))
+            # no levels in time: with one for each soak they could follow any memory of temperature
             steps = None if is_clock(name) else _levels(values)
             if steps is not None:
-                suspected.append(Driver(name, _alike(problem, steps)))
+                suspected.append(Driver(name, _on_every_axis(problem, steps)))
             if not problem.lot.radial and knots > 2:
-                # a dependence of the scale factors: what the driver changes is then felt along each axis
+                # a dependence of the scale factors: the curve is multiplied by the force along each axis
                 suspected.append(Driver(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
     if not problem.lot.radial:
         force = own_forces(problem).reshape(problem.blocks, problem.n)
         suspected.append(Driver("pose", _columns(curve(force, _KNOTS)), _unit_range(force)))
         suspected += _table(problem)
     duration = max(float(np.ptp(state.time)), 1.0)
-    return [*suspected, *(_swing(problem, duration / cycles) for cycles in _CYCLES)]
+    return [*suspected, *(_oscillation(problem, duration / cycles) for cycles in _CYCLES)]
 
 
 def wide_suspects(problem: Problem) -> list[Driver]:
-    """For every driver that varies in a lot, curves of its misalignment, of the fixture's rotation and of the transfer curve.
+    """For every driver that varies in a lot, curves of misalignment, of the fixture's rotation and of the transfer curve.
 
-    A lot of columns: they are suspected only where several causes, changes of handling among them, were found together.
+    Because of their many columns they are suspected only where several causes, also handling errors, were found together.
     """
     if problem.lot.radial:
         return []
@@ -119,7 +119,7 @@ def wide_suspects(problem: Problem) -> list[Driver]:
 
 
 def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -> tuple[CurveFit, list[Term]] | None:
-    """The curve that explains a lot better than the chosen effects, with the effects that remain; None if there is none."""
+    """The curve that explains the lot better than chosen effects, and the effects that remain beside it; None if none does."""
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
     full = Model(base.problem, [*base.terms, *chosen], near=base.noise)
     full_cost, base_cost = cost_of_model(full), cost_of_model(base)
@@ -131,24 +131,24 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
         return None
     best, suspect = min(fits, key=lambda pair: pair[0].cost)
     if any(fit.cost <= best.cost for fit in fit_curves(base, [s for s in every if s.name in held])):
-        return None  # the recorded column that the effects hold already, in a shape of its own
+        return None  # a covariate that the chosen effects already contain fits as well with a free curve
     remaining: list[Term] = []
     if len(chosen) > 1:
-        # the first two of its driver: a dependence of the bias, and levels
+        # the first two suspects of the driver: a smooth dependence of the bias, and levels
         alike = [s for s in field if s.name == suspect.name and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
         worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (base_cost - best.cost))
         best, remaining = _with_others(base, chosen, alike, best, worth)
     replaced = [t for t in chosen if t not in remaining]
     if not replaced or best.cost + (decisions.CURVE_AHEAD / len(replaced) if len(replaced) < 3 else 0.0) >= full_cost:
-        return None  # more than two effects in place of one curve have no priority
-    # a memory for itself, too: what it leaves over, of inexact shape, is often chosen beside it
+        return None  # up to two effects have priority over a curve that is not clearly better
+    # an effect with memory is also compared alone: its inexact shape often leaves residuals that further effects explain
     rivals = [t for t in replaced if t.effect.memory or len(replaced) == 1]
     priority = any(_nearly_as_good(base, [*remaining, t], base_cost - best.cost) for t in rivals)
     return None if priority else (best, remaining)
 
 
 def _nearly_as_good(base: Model, terms: Sequence[Term], gain: float) -> bool:
-    """Whether effects, of which the last is in question, explain so much of what a curve gains that they have priority."""
+    """Whether effects, the last of which is in question, gain so nearly as much as a curve that they have priority."""
     # a curve over time can follow any memory of one run
     share = (3.0 if terms[-1].effect.memory else 1.0) * decisions.CURVE_SHARE
     alone = cost_of_model(base) - cost_of_model(Model(base.problem, [*base.terms, *terms], near=base.noise))
@@ -156,23 +156,23 @@ def _nearly_as_good(base: Model, terms: Sequence[Term], gain: float) -> bool:
 
 
 def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
-    """The curve that explains far better, with the noise beside it, what a model has as noise; None if there is none.
+    """The curve that explains far better, with the noise estimated again, what a model attributes to noise; None if none.
 
-    A tide that all units share is no random walk, and what each move leaves is no louder noise; but beside a model without it the
-    noise is estimated so that it can be, and no test at that noise sees it.
+    A tide common to all units is not a random walk, and relaxation after each move is not increased noise; but in a model without
+    them the estimated noise includes them, so that no test at that noise detects them.
     """
     fits = fit_curves(base, _promising(base, field), _noises(base))
     if not fits:
         return None
     best = _tuned(base, min(fits, key=lambda f: f.cost))
     paid = PER_COEFFICIENT * best.rank + PER_COLUMN * (best.model.local.shape[-1] - base.local.shape[-1])
-    # of noise that units share all of them follow a curve by chance when one does
+    # noise that the units share follows a curve by chance in all units at once
     ahead = (cost_of_model(base) - best.cost + paid) / shared_noise(best.model) - paid
     return best if ahead > decisions.CURVE_AHEAD else None
 
 
 def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
-    """The unexplained dependence that a curve beside a model shows, the best of ``looks`` curves."""
+    """The unexplained dependence that a curve, the best of ``looks`` curves, shows in a model."""
     before = base.at(fit.model.noise)
     drop = max(before.rss - fit.model.space.rss, 0.0)
     log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
@@ -181,13 +181,13 @@ def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
 
 
 def _noises(base: Model) -> list[Noise]:
-    """The noise of a model, and one with less wander, which may have absorbed a curve."""
+    """The noise of a model, and one with less wander, because the estimated wander may have absorbed a curve."""
     less = base.noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
     return [base.noise] if less == base.noise.shares else [base.noise, base.noise_at(less)]
 
 
 def _promising(base: Model, field: Sequence[Driver]) -> list[Driver]:
-    """The suspects whose own curves, block by block, reduce the residual most, at the noise of a model and with less wander."""
+    """The suspects whose curves, free in each block, reduce the residuals most, at a model's noise and with less wander."""
     picked: dict[int, Driver] = {}
     for noise in _noises(base):
         space = base.at(noise)
@@ -199,7 +199,7 @@ def _promising(base: Model, field: Sequence[Driver]) -> list[Driver]:
 def _with_others(
     base: Model, chosen: Sequence[Term], suspect: Sequence[Driver], best: CurveFit, worth: float
 ) -> tuple[CurveFit, list[Term]]:
-    """The best curve with the effects that it does not replace: no functions of its own driver, and above their price."""
+    """The best curve, and the chosen effects that are no functions of its driver and reduce the cost by more than ``worth``."""
     remaining: list[Term] = []
     for term in chosen:
         if _function_of(base, term, suspect[0]):
@@ -224,7 +224,7 @@ def _function_of(base: Model, term: Term, suspect: Driver) -> bool:
 
 
 def _sharp(model: Model, suspect: Driver) -> CurveFit | None:
-    """The best bump or hinge of a driver beside a model: features narrower than a smooth curve can follow."""
+    """The best bump, hinge or step of a driver added to a model: features narrower than a smooth curve can follow."""
     if suspect.values is None:
         return None
     z = suspect.values
@@ -237,14 +237,14 @@ def _sharp(model: Model, suspect: Driver) -> CurveFit | None:
         return None
     column = columns[..., best : best + 1]
     if best < len(_WIDTHS) * len(_CENTRES):
-        column = _narrowed(model, z, _CENTRES[best % len(_CENTRES)], _WIDTHS[best // len(_CENTRES)])
+        column = _refined_bump(model, z, _CENTRES[best % len(_CENTRES)], _WIDTHS[best // len(_CENTRES)])
     fitted = model.with_curves(column)
     cost = cost_of_model(fitted) + 2.0 * PER_COEFFICIENT
     return CurveFit(Driver(suspect.name, _columns(column)), fitted, int(gain.rank[best]) + 2, cost)
 
 
-def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
-    """Column of a bump whose position and width are refined between the values of the grid."""
+def _refined_bump(model: Model, z: Array, centre: float, width: float) -> Array:
+    """Column (blocks, n, 1) of a bump, with position and width refined between the values of the grid."""
     space = model.space
     column = np.zeros(0)
     for reach in (0.5, 0.2):
@@ -260,17 +260,17 @@ def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
 
 
 def _unit_range(values: Array) -> Array:
-    """Values over the run's range, 0 … 1."""
+    """Values scaled to 0 … 1 over the run."""
     return (values - values.min()) / max(float(np.ptp(values)), 1e-12)
 
 
 def alike(values: Array, other: Array | None) -> bool:
-    """Whether two quantities are equivalent: after a soak the chamber's temperature is the sensor's."""
+    """Whether two quantities are equivalent (correlation above 0.98), as chamber and sensor temperature after soaks."""
     return other is not None and float(np.corrcoef(values.ravel(), other.ravel())[0, 1]) > 0.98
 
 
 def _levels(values: Array) -> Array | None:
-    """A step between neighbouring groups of values if they form a few groups (soaks), (units, n, d); else None."""
+    """Steps (units, n, d) between neighbouring groups of values, if these form a few groups such as soaks; else None."""
     order = np.sort(values, axis=None)
     gaps = np.diff(order)
     edges = order[:-1][gaps > 0.03 * np.ptp(order)] + 0.5 * gaps[gaps > 0.03 * np.ptp(order)]
@@ -279,52 +279,52 @@ def _levels(values: Array) -> Array | None:
     level = np.searchsorted(edges, values[0])
     visits = 1 + int(np.count_nonzero(np.diff(level)))
     if visits < _VISITS * (edges.size + 1):
-        return None  # levels visited once each are free offsets: they could follow any memory
+        return None  # levels visited only once are free offsets, which could follow any memory
     return np.stack([(values > e).astype(float) for e in edges], axis=-1)
 
 
-def _alike(problem: Problem, columns: Array) -> Callable[[], Candidate]:
-    """Columns (units, n, d), equal on every axis."""
+def _on_every_axis(problem: Problem, columns: Array) -> Callable[[], Candidate]:
+    """Function that gives the candidate of columns (units, n, d) used on every axis."""
     each = columns if problem.lot.radial else np.repeat(columns, problem.per_unit, axis=0)
     return _columns(np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
 
 
 def _columns(columns: Array, *, shared: bool = False) -> Callable[[], Candidate]:
-    """Columns (blocks, n, d) that are stored: every search looks at them again."""
+    """Function that gives the candidate of columns (blocks, n, d); they are stored, because every search uses them."""
     candidate = Candidate(columns[:, :, None, :], shared=shared)
     return lambda: candidate
 
 
 def along_force(problem: Problem, columns: Array) -> Array:
-    """Columns (units, n, d) times the force along each axis, (blocks, n, d)."""
+    """Columns (units, n, d) times the force along each axis, g: (blocks, n, d)."""
     wide = own_forces(problem)[..., None] * columns[:, None]
     return wide.reshape(problem.blocks, problem.n, -1)
 
 
-def _swing(problem: Problem, period: float) -> Driver:
-    """Sine and cosine of the time with a period, s."""
+def _oscillation(problem: Problem, period: float) -> Driver:
+    """The driver of an oscillation in time: sine and cosine of a period, s."""
     time = problem.lot.state.time
     phase = 2.0 * np.pi * (time - time.min()) / period
-    return Driver("time_s", _alike(problem, np.stack([np.sin(phase), np.cos(phase)], axis=-1)), period=period)
+    return Driver("time_s", _on_every_axis(problem, np.stack([np.sin(phase), np.cos(phase)], axis=-1)), period=period)
 
 
 def _tuned(base: Model, fit: CurveFit) -> CurveFit:
-    """A swing with its period refined between the values of the grid; any other curve as it is."""
+    """An oscillation with its period refined between the values of the grid; any other curve unchanged."""
     if fit.driver.period is None:
         return fit
     duration = float(np.ptp(base.problem.lot.state.time))
     space, cycles = base.at(fit.model.noise), duration / fit.driver.period
     for reach in _BETWEEN:
-        near = [_swing(base.problem, duration / (cycles + step * reach)) for step in (-2, -1, 0, 1, 2)]
+        near = [_oscillation(base.problem, duration / (cycles + step * reach)) for step in (-2, -1, 0, 1, 2)]
         worth = [float(space.gain(suspect.candidate).drop[0]) for suspect in near]
         cycles += (int(np.argmax(worth)) - 2) * reach
-    (tuned,) = fit_curves(base, [_swing(base.problem, duration / cycles)])
+    (tuned,) = fit_curves(base, [_oscillation(base.problem, duration / cycles)])
     tuned = replace(tuned, rank=tuned.rank + 1, cost=tuned.cost + PER_COEFFICIENT)
     return tuned if tuned.cost < fit.cost else fit
 
 
 def _table(problem: Problem) -> list[Driver]:
-    """Rotations of the fixture that depend on one table angle, the same for all units."""
+    """Drivers of fixture rotations, common to all units, as harmonics of one table angle."""
     state = problem.lot.state
     if state.outer is None or state.inner is None:
         return []

@@ -1,8 +1,8 @@
-"""Effects that a measurement cannot show, at all or at some values of their nonlinear parameters; smallest sizes of the others.
+"""Effects that a measurement cannot show, at all or at some parameter values; smallest detectable sizes of the others.
 
-The smallest size that is detected is given with the measurement's own noise and without the slow part of it. The slow part, 1/f
-and random walk, is estimated from the same dwells and can contain an effect of the same shape. So a model that is adequate with
-such noise is adequate only for effects larger than these sizes.
+The smallest detectable size is given at the noise of the measurement and without its slow part. The slow part, 1/f noise and
+random walk, is estimated from the same dwells and can contain an effect of the same shape. A model that is adequate with such
+noise is therefore adequate only with regard to effects larger than these sizes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,14 +31,14 @@ from inertial.state import History, State
 InPart = tuple[tuple[str, tuple[UnseenRange, ...]], ...]
 
 _SCATTER = 5.0
-"""Standard deviations of the thermometer within which a reading is the temperature of its soak."""
+"""Standard deviations of the thermometer within which a reading counts as the temperature of its soak."""
 
 
 def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[tuple[str, ...], InPart]:
-    """Effects that the plan cannot show, and effects that it cannot show at some values, with the values.
+    """Ids of effects that the plan cannot show, and effects that it cannot show at some parameter values, with these values.
 
-    An effect is not visible if its columns are zero under the plan or equal to columns of the model, or if its quantities were
-    not recorded.
+    An effect is not visible if its columns are zero in the plan or linear combinations of columns of the model, or if its
+    quantities were not recorded.
     """
     gains = field.gains([base.at(base.problem.covariance.white_noise())], {t.effect.id for t in base.terms})[0]
     blind = [e.id for e in field.effects if e.id in gains and not any(_at_rest(field, e, gains[e.id]))]
@@ -54,17 +54,17 @@ def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> t
 
 
 def _at_rest(field: Candidates, effect: AnyEffect, gain: Gain) -> list[bool]:
-    """Whether an effect is visible at each value of its grid at which a run begins at rest."""
+    """Whether an effect is visible, for each value of its grid at which the run begins at rest."""
     shown = zip(field.grids[effect.id], gain.rank > 0, strict=True)
     return [bool(there) for values, there in shown if at_rest(effect, values)]
 
 
 def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str, list[bool]]:
-    """Whether each effect with a memory is visible, at every value on the grid of its parameter.
+    """Visibility of each effect with memory at every grid value of its parameter, by effect id.
 
-    A memory has an unknown state before the first dwell: with rising soaks, a play narrower than their steps is equivalent to
-    this state and a bias. One unit is enough, as the plan is the same for all. For a play the scatter of the thermometer is
-    removed first: a narrow play would follow it from reading to reading.
+    A memory has an unknown initial state: with rising soaks, a backlash narrower than their steps is equivalent to this state and
+    a bias. One unit suffices, because the plan is the same for all. For a backlash the scatter of the thermometer is removed
+    first, because a narrow backlash would follow it from reading to reading.
     """
     if base.problem.lot.radial:
         return {}
@@ -84,7 +84,7 @@ def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str,
 
 
 def _follows_order_only(effect: AnyEffect, state: State, values: dict[str, float]) -> bool:
-    """Whether a memory depends on the order of what it follows and not on time, as a play does and a lag does not."""
+    """Whether a memory depends only on the order of its inputs, like a backlash, and not on time, like a lag."""
     if not isinstance(effect, SensorEffect):
         return False
     once, slower = (
@@ -95,7 +95,7 @@ def _follows_order_only(effect: AnyEffect, state: State, values: dict[str, float
 
 
 def without_scatter(state: State) -> State:
-    """A state of one unit whose readings are those of their soaks as far as the thermometer's scatter explains the difference."""
+    """The state of one unit with readings set to the temperature of their soak if thermometer scatter explains the difference."""
     if state.temperature is None:
         return state
     number, read = soaks(state), state.temperature.reshape(-1)
@@ -116,10 +116,10 @@ def without_scatter(state: State) -> State:
 
 
 def _shown(model: Model, noise: Noise, effect: AnyEffect, values: dict[str, float]) -> bool:
-    """Whether the first column of an effect is visible beside the model and the possible initial state."""
+    """Whether the first column of an effect is visible beside the model and a free initial state."""
     problem = model.problem
     term = Term(effect, tuple(values.items()), 1)
-    # not model.with_curves: the noise of the model itself is not needed
+    # model.with_curves would estimate the noise of the model, which is not needed
     beside = Model(problem, model.terms, curves=problem.start(effect, values))
     return bool(np.any(beside.at(noise).gain(term.candidate(problem)).rank[0]))
 
@@ -130,7 +130,7 @@ _DIGITS = 6
 
 @dataclass(frozen=True)
 class Smallest:
-    """The size of an effect, g rms over the dwells, that is detected, with slow noise and without it."""
+    """The smallest detectable size of an effect, g rms over the dwells, with slow noise and without it."""
 
     effect: str
     size: float
@@ -138,9 +138,9 @@ class Smallest:
 
 
 def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
-    """The smallest detected sizes of the visible effects, those that slow noise hides most first.
+    """The smallest detectable sizes of the visible effects, effects hidden most by slow noise first.
 
-    Of an effect with nonlinear parameters the median over the values at which it is visible.
+    For an effect with nonlinear parameters it is the median over the values at which it is visible.
     """
     noise = model.noise
     spaces = model.at(noise), model.at(Noise(Shares(), noise.scale, noise.prior))
@@ -152,19 +152,19 @@ def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
         sizes = sizes[:, np.isfinite(sizes).all(axis=0) & (sizes > 0.0).all(axis=0)]
         if sizes.size:
             smallest.append(Smallest(effect.id, *np.median(sizes, axis=1).tolist()))
-    # of effects that the plan shows alike the order is that of the catalogue, not that of rounding errors
+    # effects that the plan shows equally well keep the order of the catalogue, independent of rounding errors
     return sorted(smallest, key=lambda s: -round(s.size / s.without_slow, _DIGITS))
 
 
 def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], effect: AnyEffect, least: float) -> Array:
-    """RMS, g, of the effect's most visible column that is detected in the mean, (2, grid), in each space; else infinite.
+    """Smallest RMS, g, of the effect's most visible column that is detected on average, (2, grid): one row per space.
 
-    Of an effect whose run begins at rest.
+    It is infinite where the effect is not visible; the run is assumed to begin at rest.
 
     Parameters
     ----------
-    spaces : with the noise that was found, and with its white part alone
-    least : RMS, g, of the part of an effect beyond the model below which it is never reported
+    spaces : space at the estimated noise, and at its white part alone
+    least : g, RMS of an effect's part beyond the model below which it is never reported
     """
     problem, all_values = model.problem, field.grids[effect.id]
     values: list[Array] = []
@@ -191,7 +191,7 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], effect:
 
 
 def _squares(piece: Candidate, there: Flags) -> Array:
-    """Sums of squares (grid, p) of columns in g over the dwells (blocks, n) that are there."""
+    """Sums of squares (grid, p), g², of columns over the present dwells ``there`` (blocks, n)."""
     each = piece.columns**2
     if piece.rows is None:
         return np.einsum("bngp,bn->gp", each, there.astype(np.float64))
@@ -202,7 +202,7 @@ def _squares(piece: Candidate, there: Flags) -> Array:
 
 
 def _needed(coefficients: float, looks: int, count: int) -> float:
-    """Noncentrality from which an effect with this number of coefficients is detected in the mean."""
+    """Noncentrality at which an effect with this number of coefficients is detected on average."""
     deviance = max(float(chi2_upper(NAMED_BELOW / max(looks, 1), coefficients)), coefficients)
     while deviance - price(deviance, coefficients) < np.log(max(count, 2)):
         deviance *= 1.02

@@ -1,4 +1,4 @@
-"""The verdict on a model: whether it is adequate, with its residual, the noise of the measurement, and the probability."""
+"""The verdict on a model: whether it is adequate, with the RMS of the residuals, the noise floor and the probability."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,24 +32,24 @@ from inertial.planning.drivers import drivers_of
 from inertial.probability import passes
 
 _ALMOST_CONSTANT = 10.0 * SEEN
-"""Standard deviation of the temperature over its distance from the reference, below which a run is one at one temperature: ten
-times what is visible of a column."""
+"""Standard deviation of the temperature over the distance of its mean from the reference, below which a run counts as isothermal:
+ten times the threshold of visibility of a column."""
 
 
 @dataclass(frozen=True)
 class Verdict:
     """The verdict on a model by a lot, with the examination that it rests on; errors in g.
 
-    run, search, drivers : the examined lot, the search for effects in it, and the recorded quantities
-    result : of the search; without effects where the data cannot judge the model
+    run, search, drivers : the examined lot, the search for effects in it, and the tested drivers
+    result : outcome of the search; without effects where the data cannot judge the model
     final : the model with all identified effects
-    beside : that model with a curve that would else count as noise; drivers are judged at its noise
-    unexplained : a driver that no effect explains
-    removed : single dwells that were left out, those marked that are tails of the noise
-    rms : of the residuals of the judged model; floor : of the noise of the measurement, white and wander
-    log_p : natural logarithm of the probability that decided: that an adequate model fits as badly somewhere, or that noise
-        explains what was found
-    sound : whether the other dwells and the search have nothing against the model
+    beside : that model with a curve that would otherwise count as noise; drivers are judged at its noise
+    unexplained : a driver whose influence no effect explains
+    removed : single dwells that were left out; ``tail`` marks those within the tails of the noise
+    rms : RMS of the residuals of the judged model; floor : RMS expected from the noise of the measurement, white and wander
+    log_p : natural logarithm of the probability that decided: of a test statistic as extreme in an adequate model, or of noise
+        that explains as much as what was found
+    sound : whether the remaining dwells pass and the search finds nothing
     adequate : None if the data cannot decide, for the reason in ``unjudged``
     """
 
@@ -85,7 +85,7 @@ class Verdict:
 
     @property
     def found(self) -> bool:
-        """Whether something is found that the model lacks or the data spoils: in noise in 0.3 % of lots, by its bound."""
+        """Whether a missing effect, a driver or a data error is found; in noise that happens in at most 0.3 % of lots."""
         spoilt = bool(self.run.handled) or any(not dwell.tail for dwell in self.removed)
         return spoilt or bool(self.result.added) or self.unexplained is not None
 
@@ -93,8 +93,8 @@ class Verdict:
 def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     """The verdict of a lot on a model.
 
-    A handling error makes a model that passes not adequate, and the noise of the measurement is that beside the missing effects:
-    so the search for both belongs to the verdict.
+    The verdict includes the search for handling errors, which make a passing model not adequate, and for missing effects, without
+    which the noise of the measurement cannot be estimated.
 
     Parameters
     ----------
@@ -103,35 +103,35 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     rng : draws the noise that adequacy is measured against
     """
     verdict = _judged(lot, effects, rng)
-    told = [
+    errors = [
         m.term for named in verdict.run.handled for m in named.effects.members if isinstance(m.term.effect, Handling)
     ]
-    if not told or (verdict.unexplained is None and not verdict.result.added):
+    if not errors or (verdict.unexplained is None and not verdict.result.added):
         return verdict
-    # found before the driver or the effect was: what that leaves over may have looked like an error of handling
-    without = _judged(lot, effects, rng, frozenset(t.effect.id for t in told))
-    return without if _as_good(without, verdict, told) else verdict
+    # a handling error found before the driver or effect may only have imitated part of it
+    without = _judged(lot, effects, rng, frozenset(t.effect.id for t in errors))
+    return without if _as_good(without, verdict, errors) else verdict
 
 
-def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
-    """Whether what explains a lot does so as well without the errors of handling that were named beside it."""
+def _as_good(other: Verdict, verdict: Verdict, errors: Sequence[Term]) -> bool:
+    """Whether the same causes explain a lot as well in ``other``, without the named handling ``errors``."""
     if other.handled or _bad(other) > _bad(verdict) or _causes(other) != _causes(verdict):
         return False
     model = _as_found(other, verdict) if other.unexplained is None else other.unexplained.model
     if model is None:
         return False
     field = verdict.search.field
-    if model.problem.blocks != field.problem.blocks and any("unit" in t.keywords for t in told):
-        return False  # the curve was fitted to some of the units, and the error is of one
-    return not any(convincing(field, model, judge(field, model, term)) for term in told)
+    if model.problem.blocks != field.problem.blocks and any("unit" in t.keywords for t in errors):
+        return False  # the curve was fitted to a sample of units, which may not include the unit of the error
+    return not any(convincing(field, model, judge(field, model, term)) for term in errors)
 
 
 def _as_found(other: Verdict, verdict: Verdict) -> Model:
-    """The model of a verdict with the effects as another one found them, and what each remembers from before the run free.
+    """The model of ``other`` with the effects at the values of ``verdict``, and with free initial states of their memories.
 
-    As they were found: an effect that moves to the dwell of an error, as a step does, has replaced the error and does not
-    refute it. Devices that were not at rest leave something over in the first dwells: for that they take many coefficients, and a
-    pose that was wrong there takes two.
+    The values are not fitted again, because an effect that moves to the dwell of an error, as a step can, replaces the error and
+    does not refute it. Devices not at rest leave residuals in the first dwells, which take many coefficients, while a wrong pose
+    there takes two.
     """
     added = [replace(t, rest=False) if t.memory else t for t in verdict.result.added]
     return Model(other.problem, [*other.base.terms, *added], near=other.final.noise)
@@ -143,14 +143,14 @@ def _bad(verdict: Verdict) -> int:
 
 
 def _causes(verdict: Verdict) -> set[str]:
-    """The driver that no effect explains if there is one, else the ids of the effects."""
+    """The name of the unexplained driver if there is one, else the ids of the added effects."""
     if verdict.unexplained is not None:
         return {verdict.unexplained.driver}
     return {t.effect.id for t in verdict.result.added}
 
 
 def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[str] = frozenset()) -> Verdict:
-    """The verdict with all errors of handling but some as candidates."""
+    """The verdict with all handling errors except those of ``barred`` ids as candidates."""
     run, search = examined(_about_its_temperature(lot, effects), effects, barred)
     base, searched = search.base, search.result
     drivers = looks_of(base.problem)
@@ -170,10 +170,10 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
     final, unexplained = searched.model, None
     if not unjudged and (searched.added or not passed):
         final, unexplained = _with_curves(search.part, base, searched, drivers)
-    # a drift can hide where adequacy does not look
+    # a withdrawn drift counts even if no test of adequacy shows it
     unexplained, beside = unexplained or (None if unjudged else run.drift), final
     if not (unjudged or searched.added or unexplained):
-        unexplained, curved = _taken_for_noise(search.part)
+        unexplained, curved = _curve_taken_for_noise(search.part)
         if curved is not None and search.part.field is search.field:
             drivers.append(curved.driver)
             beside = curved.model
@@ -197,11 +197,11 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
 
 
 def _about_its_temperature(lot: Lot, effects: Sequence[str]) -> Lot:
-    """A lot at one temperature, with the temperature of the candidates counted from its mean.
+    """An isothermal lot with its mean as the reference temperature of the candidates; any other lot unchanged.
 
-    Counted from 25 °C the column of a linear coefficient is constant but for a few per mille, as good as invisible beside the
-    bias, and its cube, three times as visible, is named in its place. A model that has a coefficient of the temperature says what
-    it counts from.
+    With a reference of 25 °C the column of a linear coefficient would be constant up to a few per mille and almost invisible
+    beside the bias, and its cube, three times as visible, would be named instead. A model with a temperature coefficient keeps
+    its reference.
     """
     state = lot.state
     if state.temperature is None:
@@ -215,7 +215,7 @@ def _about_its_temperature(lot: Lot, effects: Sequence[str]) -> Lot:
 
 
 def _decided(searched: SearchResult, unexplained: Unexplained | None, looks: int) -> list[float]:
-    """Log probabilities, over all looks, of what is found where the adequacy of the model does not decide; zero if nothing is."""
+    """Log probabilities, over all tests, of the first effect and of the unexplained driver, as far as found; after a zero."""
     first = [r.log_p + float(np.log(max(looks, 1))) for r in searched.ladder[:1] if searched.added]
     return [0.0, *first, *([] if unexplained is None else [unexplained.log_p])]
 
@@ -223,7 +223,7 @@ def _decided(searched: SearchResult, unexplained: Unexplained | None, looks: int
 def _with_curves(
     part: LotPart, base: Model, searched: SearchResult, drivers: list[Driver]
 ) -> tuple[Model, Unexplained | None]:
-    """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
+    """The model with the confirmed effects, without those that imitate a curve; and the unexplained driver or None."""
     suspected = part.suspected(searched.added)
     by_curve = _curve_in_place_of(part, base, searched, suspected)
     if by_curve is not None:
@@ -233,7 +233,7 @@ def _with_curves(
     if not clear:
         return final, None
     if searched.added and len(suspected) < len(part.every_suspect):
-        # what the effects leave follows a driver: they may be pieces of a dependence of another kind
+        # the residuals still depend on a driver: the effects may be parts of another kind of dependence
         by_curve = _curve_in_place_of(part, base, searched, part.every_suspect)
         if by_curve is not None:
             return by_curve
@@ -246,10 +246,10 @@ def _with_curves(
 
 
 def _with_a_small_effect(search: EffectSearch, base: Model) -> SearchResult:
-    """The search that found nothing, with the best evident effect of those too small to be searched for.
+    """A search that found nothing, with the best evident effect below the smallest size that matters, if there is one.
 
-    Beside an adequate model, or a larger effect, what is small is the remainder of an imperfect driver. Where the model is not
-    adequate and nothing else says why, it is the answer.
+    In an adequate model, or beside a larger effect, a small effect may result from an inaccurate driver. Where the model is not
+    adequate for no other known reason, the small effect is named.
     """
     for rival in search.result.ladder:
         if isinstance(rival.term.effect, Handling):
@@ -259,21 +259,21 @@ def _with_a_small_effect(search: EffectSearch, base: Model) -> SearchResult:
     return search.result
 
 
-def _taken_for_noise(part: LotPart) -> tuple[Unexplained, CurveFit] | tuple[None, None]:
-    """The driver of a curve that the model has as noise, and the curve; None if there is none."""
+def _curve_taken_for_noise(part: LotPart) -> tuple[Unexplained, CurveFit] | tuple[None, None]:
+    """The driver of a curve that the model attributes to noise, and the curve; None, None if there is none."""
     suspected = part.suspected([])
     fit = curve_in_noise(part.base, suspected)
     if fit is None:
         return None, None
     found = unexplained_by(part.base, fit, len(suspected))
-    # of few dwells for each unit the deviance falls by what a curve takes of their freedom, too
+    # with few dwells per unit the deviance also falls because a curve takes degrees of freedom
     return (found, fit) if found.log_p < np.log(NAMED_BELOW) else (None, None)
 
 
 def _curve_in_place_of(
     part: LotPart, base: Model, searched: SearchResult, suspected: Sequence[Driver]
 ) -> tuple[Model, Unexplained] | None:
-    """The model with a curve in place of effects that only imitate it, less the curve; None if there is none."""
+    """The model without the effects that imitate a curve, and the curve as an unexplained driver; None if there is none."""
     better = better_curve(part.base, searched.added, suspected) if searched.added else None
     if better is None:
         return None
@@ -282,14 +282,14 @@ def _curve_in_place_of(
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
-    """Whether a driver is significant and large, with the wander estimated beside it: slow drivers and wander look alike."""
+    """Whether a driver is significant and large, with wander estimated beside it, because slow drivers look like wander."""
     if model.explained(driver.candidate, model.floor()) < decisions.UNEXPLAINED * model.floor():
         return False
     return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
 
 
 def _driver_log_p(model: Model, driver: Driver) -> float:
-    """Logarithm of the probability that noise follows a driver as much, with the share of wander estimated beside it."""
+    """Log probability that noise shows as strong a dependence on a driver, with wander estimated together with it."""
     richer = model.with_curves(driver.candidate.of_blocks[:, :, 0, :])
     space = model.at(richer.noise)
     gain = space.gain(driver.candidate)

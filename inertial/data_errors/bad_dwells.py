@@ -1,6 +1,6 @@
-"""Single bad dwells, by the residuals after each is deleted.
+"""Single bad dwells, identified by their deletion residuals.
 
-With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deleted from its series deviates by (Py)_i/P_ii, and (Py)_i²/P_ii over its variance is
+With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ the deletion residual of a dwell is (Py)_i/P_ii, and (Py)_i²/P_ii over its variance is
 chi-square: no further fit is needed. Deletion identifies the dwell; robust weights would change all dwells and identify none.
 """
 
@@ -17,19 +17,19 @@ from inertial.estimation.space import Space
 
 _ROUNDS = 8
 _ALIKE = 0.6
-"""Of the largest deviation: dwells with smaller deviations are tested again after the noise is estimated without the largest."""
+"""Share of the largest deviation in a round below which dwells are tested again only after the noise is estimated anew."""
 
 _AT_LEAST = 2
-"""Dwells that may be left out of a record, however short it is."""
+"""Number of dwells that may always be left out of a record, however short it is."""
 
 _SEVERAL = 3
-"""Units from which the median over the units tells a wrong pose from a bad dwell; with fewer the dwells of one pose do."""
+"""Smallest number of units whose median distinguishes a wrong pose from a bad dwell; with fewer, repeated dwells of a pose do."""
 
 _EVERY_TIME = 0.7
-"""Share of the mean deviation of all dwells of a pose that each of them has along it if the pose is off every time.
+"""Smallest component of each dwell's deviation along the mean deviation of its pose, over that mean, if the pose is always off.
 
-One bad dwell of three gives a third of its deviation to the mean, and less than a tenth, of the opposite sign, to each other
-one: it stays a bad dwell.
+One bad dwell of three contributes a third of its deviation to the mean and leaves less than a tenth, of opposite sign, in each
+of the others: it remains a bad dwell.
 """
 
 _LEAST_DOF = 6
@@ -41,7 +41,7 @@ def bad_dwells(model: Model, *, of_all: bool = False) -> list[BadDwell]:
 
     Parameters
     ----------
-    of_all : dwells that disagree in most units, too; else these are left to a pose that is wrong
+    of_all : whether dwells that disagree in most units are included; otherwise they are left to the search for wrong poses
     """
     if model.problem.lot.radial:
         return bad_norms(model)
@@ -58,7 +58,7 @@ def bad_dwells(model: Model, *, of_all: bool = False) -> list[BadDwell]:
 
 
 def any_of_all(model: Model) -> bool:
-    """Whether a dwell disagrees in most units, by more than chance over all dwells."""
+    """Whether any dwell disagrees in most units, beyond chance over all dwells."""
     if model.problem.lot.radial:
         return False
     deletion = _Deletion(model.space, model.problem.per_unit)
@@ -69,7 +69,7 @@ def any_of_all(model: Model) -> bool:
 
 
 def _round(model: Model, most: int, *, of_all: bool) -> list[BadDwell]:
-    """Dwells that stand out at one noise, the largest first, each deleted before the next."""
+    """Outlying dwells at a fixed noise, the largest first, each deleted before the next is tested."""
     deletion = _Deletion(model.space, model.problem.per_unit, of_all=of_all)
     if deletion.units < _SEVERAL:
         deletion.left_to_poses = deletion.off_every_time(poses(model.problem.lot))
@@ -86,10 +86,10 @@ def _round(model: Model, most: int, *, of_all: bool) -> list[BadDwell]:
 
 
 class _Deletion:
-    """Deletion statistics of every dwell of every unit, dwells deleted one by one.
+    """Deletion statistics of every dwell of every unit, updated as dwells are deleted one by one.
 
-    left_to_poses : (n,), dwells that are left to the alternatives that concern a pose
-    of_all : whether dwells that disagree in most units are not left to them
+    left_to_poses : (n,), whether a dwell is left to the search for wrong poses
+    of_all : whether dwells that disagree in most units are tested here instead
     """
 
     def __init__(self, space: Space, axes: int, *, of_all: bool = False) -> None:
@@ -98,7 +98,7 @@ class _Deletion:
         self.there = space.covariance.there.copy()
         self.units, self.n = blocks // axes, n
         scaled = space.noise.scale[:, None]
-        # in units of the white variance of each block: its own variance is estimated again after each deletion
+        # without the scale: the variance of each block is estimated again after each deletion
         self.left, self.size = (each * scaled**2 for each in space.deleted)
         self.squares, self.dof = space.squares.copy(), space.by_block.copy()
         if np.isfinite(space.noise.prior):
@@ -109,16 +109,16 @@ class _Deletion:
 
     @property
     def known(self) -> Flags:
-        """The dwells (blocks, n) that are there, and whose model the others determine."""
+        """Whether each dwell (blocks, n) is present and its prediction determined by the other dwells."""
         return self.there & (self.size > 1e-9 * self.size.max())
 
     @property
     def known_size(self) -> Array:
-        """P_ii of these, (blocks, n); one elsewhere."""
+        """P_ii of the :attr:`known` dwells, (blocks, n); one elsewhere."""
         return np.where(self.known, self.size, 1.0)
 
     def off_every_time(self, pose: Places) -> Flags:
-        """Dwells (n,) of poses (n,) all of whose dwells, two at least, are off by about the same."""
+        """Whether each dwell (n,) has a pose (n,) whose dwells, at least two, all deviate by about the same."""
         there = np.asarray(self.known.reshape(self.units, self.axes, self.n).all(axis=1))
         off = np.where(self.known, self.left / self.known_size, 0.0)
         off = off.reshape(self.units, self.axes, self.n) * there[:, None]
@@ -135,7 +135,7 @@ class _Deletion:
         return (every & several)[pose]
 
     def worst(self) -> tuple[int, int, Array] | None:
-        """Unit and dwell that stand out most, with their deviations (axes,); None where none does by more than chance."""
+        """The most outlying dwell: unit, dwell, standardised deviations (axes,); None if none exceeds chance."""
         squares = self._squares()
         statistic = squares.sum(axis=1)
         if self.units >= _SEVERAL and not self.of_all:
@@ -158,7 +158,7 @@ class _Deletion:
         return self._studentised(np.where(self.known, self.left**2 / self.known_size, 0.0))
 
     def _studentised(self, drop: Array) -> Array:
-        """Squares of each dwell over a variance without it, (units, axes, n)."""
+        """Squares ``drop`` (blocks, n) over a variance estimated without the dwell, (units, axes, n)."""
         if np.isfinite(self.prior):
             squares, dof = self.squares[:, None], self.dof[:, None]
             variance = np.maximum(squares - drop, 0.0) + self.centre[:, None]
@@ -170,7 +170,7 @@ class _Deletion:
         return (drop / np.maximum(variance, 1e-300)).reshape(self.units, self.axes, self.n)
 
     def delete(self, unit: int, dwell: int) -> Array:
-        """Take one dwell out; its deviation, (axes,), g."""
+        """Delete one dwell of a unit and update the statistics; returns its deletion residual, (axes,), g."""
         blocks = range(unit * self.axes, (unit + 1) * self.axes)
         off = np.array([self.left[b, dwell] / self.size[b, dwell] for b in blocks])
         for axis, b in enumerate(blocks):
@@ -187,7 +187,7 @@ class _Deletion:
 
 
 def deletion_residuals(model: Model) -> Array:
-    """Deviation of each dwell when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
+    """Standardised deletion residuals of all dwells and axes of a model, (m,), without dwells that are left out."""
     space = model.space
     deletion = _Deletion(space, model.problem.per_unit)
     scaled = deletion.left / np.sqrt(deletion.known_size) / space.noise.scale[:, None]

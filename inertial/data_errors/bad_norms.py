@@ -1,8 +1,8 @@
 """Bad dwells where only the norm of gravity is known: one or two at a time, with the noise estimated again without them.
 
-Few dwells and many coefficients: two bad dwells hide each other, and either looks like wander. So pairs are deleted together, and
-every suspicion is judged with the noise of the other dwells: with P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ the dwells B deviate by
-(P_BB)⁻¹(Py)_B, and (Py)_Bᵀ(P_BB)⁻¹(Py)_B over the variance is F with |B| and ν − |B| degrees of freedom.
+With few dwells and many coefficients two bad dwells mask each other, and either looks like wander. Pairs are therefore deleted
+together, and every suspected set B is judged at the noise of the other dwells: with P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ its deletion
+residuals are (P_BB)⁻¹(Py)_B, and (Py)_Bᵀ(P_BB)⁻¹(Py)_B/|B| over the variance is F with |B| and ν − |B| degrees of freedom.
 """
 
 import numpy as np
@@ -22,23 +22,23 @@ MOST = 0.1
 """Largest share of a unit's dwells that is left out; two are always allowed."""
 
 BAD_NORM = 0.005
-"""Probability over all dwells of a recording below which a dwell is called bad."""
+"""Probability, over all dwells of a recording, below which a dwell counts as bad."""
 
 SECOND = 0.05
-"""Probability over the dwells of a recording below which each dwell of a pair must be bad beside the other.
+"""Probability, over the dwells of a recording, that each dwell of a pair must fall below beside the other.
 
-At one half a sound dwell was named beside a single bad one of 5 to 8 standard deviations in a quarter of the recordings.
+With one half instead, a sound dwell was named beside a single bad one of 5 to 8 standard deviations in a quarter of recordings.
 """
 
 RECORDED_DOF = 30
-"""Degrees of freedom that the noise of the samples counts for, where what the dwells leave agrees with it."""
+"""Degrees of freedom that the recorded noise of the samples counts for, where the residuals of the dwells agree with it."""
 
 AGREES = 0.05
-"""Probability of the residuals' variance beyond which it does not."""
+"""Probability of the residual variance, two-sided, below which the residuals disagree with the recorded noise."""
 
-_TRIED = 3  # suspicions of each size and noise for which the noise is estimated again
-_LONG = 220  # largest number of dwells for the test of pairs: they hide each other in short records only
-_HANGING = 1e-6  # of its weight: the part of a dwell beyond the model if it alone determines a coefficient
+_TRIED = 3  # suspected sets of each size and noise for which the noise is estimated again
+_LONG = 220  # largest number of dwells for the test of pairs: they mask each other in short records only
+_HANGING = 1e-6  # relative P_ii below which a dwell alone determines a coefficient
 
 
 def bad_norms(model: Model) -> list[BadDwell]:
@@ -46,19 +46,19 @@ def bad_norms(model: Model) -> list[BadDwell]:
     bad: list[BadDwell] = []
     most = max(2, int(MOST * model.problem.n))
     while True:
-        judged = [_judged(model, unit, dwells) for unit, dwells in _suspicions(model)]
+        judged = [_judged(model, unit, dwells) for unit, dwells in _suspected_sets(model)]
         certain = [(log_p, dwells) for log_p, dwells in judged if log_p < np.log(BAD_NORM)]
         certain = [(log_p, dwells) for log_p, dwells in certain if len(bad) + len(dwells) <= most]
         if not certain:
             return bad
-        # of nested sets the smaller one, unless the larger is far more probable
+        # prefer the smaller of nested sets, unless the larger is far more significant
         _, best = min(certain, key=lambda each: each[0] + 4.0 * len(each[1]))
         bad += best
         model = model_without(model, [d.index for d in best])
 
 
-def _suspicions(model: Model) -> list[tuple[int, tuple[int, ...]]]:
-    """Units with one or two dwells that stand out at the fitted noise or at white noise."""
+def _suspected_sets(model: Model) -> list[tuple[int, tuple[int, ...]]]:
+    """Suspected sets (unit, one or two dwells): outliers at the fitted noise or at white noise."""
     if model.space.dof < FEWEST_DOF:
         return []
     chosen: dict[tuple[int, tuple[int, ...]], None] = {}
@@ -77,14 +77,14 @@ def _suspicions(model: Model) -> list[tuple[int, tuple[int, ...]]]:
 
 
 def _looks(model: Model, size: int) -> float:
-    """Logarithm of the number of sets of so many dwells of one unit, over all units."""
+    """Logarithm of the number of sets of ``size`` dwells of one unit, over all units."""
     count = model.problem.covariance.count.astype(np.float64)
     sets = gammaln(count + 1) - gammaln(size + 1.0) - gammaln(np.maximum(count - size, 0) + 1)
     return float(np.logaddexp.reduce(sets))
 
 
 def _projector(model: Model, noise: Noise, unit: int) -> tuple[Array, Array]:
-    """P (n, n) of a unit's block at a noise, and P·y (n,)."""
+    """P (n, n), 1/g², of a unit's block at a noise, and P·y (n,), 1/g."""
     space = model.at(noise)
     eye = space.covariance.whiten(np.eye(model.problem.n)[None], noise.shares, np.array([unit])) / noise.scale[unit]
     roots = space.project(eye, np.array([unit]))[0]
@@ -92,7 +92,7 @@ def _projector(model: Model, noise: Noise, unit: int) -> tuple[Array, Array]:
 
 
 def _drops(p: Array, py: Array) -> list[tuple[int, Array, list[tuple[int, ...]]]]:
-    """Reduction of the sum of squares by deleting every single dwell, and every pair; with the indices of the dwells."""
+    """Reductions of the sum of squares by deleting single dwells, then the best pairs: (size, reductions, dwells) of each."""
     diagonal = np.diagonal(p)
     sound = np.flatnonzero(diagonal > _HANGING * max(float(diagonal.max()), 1e-300))
     singles = py[sound] ** 2 / diagonal[sound]
@@ -111,8 +111,8 @@ def _drops(p: Array, py: Array) -> list[tuple[int, Array, list[tuple[int, ...]]]
 def _variance(rest: Model, unit: int) -> tuple[float, int]:
     """Variance of the whitened residuals of the other dwells, and its degrees of freedom.
 
-    Fifteen degrees of freedom know a variance to a third. Where the white noise is recorded in the samples of each dwell, and
-    what the others leave agrees with it, the record counts as further degrees of freedom.
+    Fifteen degrees of freedom determine a variance to a third. Where the white noise is known from the samples and the residuals
+    of the other dwells agree with it, it counts as further degrees of freedom.
     """
     variance, dof = max(rest.space.variance, 1e-300), rest.space.dof
     if not rest.problem.lot.recorded:
@@ -125,7 +125,10 @@ def _variance(rest: Model, unit: int) -> tuple[float, int]:
 
 
 def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> tuple[float, list[BadDwell]]:
-    """Charged log probability of some dwells of a unit at the noise of the others; zero if these do not determine the model."""
+    """Log probability, over all sets of that size, of dwells of a unit at the noise of the others, and these as bad dwells.
+
+    Zero and none if the other dwells do not determine the model, or if one dwell of a pair is not bad beside the other.
+    """
     rest = model_without(model, [(unit, dwell) for dwell in dwells])
     if rest.space.dof < FEWEST_DOF - len(dwells) or rest.space.local_rank < model.space.local_rank:
         return 0.0, []
@@ -139,7 +142,7 @@ def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> tuple[float, li
     log_p = float(log_f_tail(statistic / size, size, dof)) + _looks(model, size)
     deviations = np.abs(off) / np.sqrt(np.diagonal(np.linalg.inv(projector)) * variance)
     if size > 1:
-        # each must be bad by itself beside the other
+        # each dwell must be bad beside the other
         each = log_f_tail(deviations**2, 1, dof) + _looks(model, 1)
         if not bool(np.all(each < np.log(SECOND))):
             return 0.0, []

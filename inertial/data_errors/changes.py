@@ -1,4 +1,4 @@
-"""What errors of handling have in common: a change from a dwell on, an error of one unit, of a single axis, of the angles."""
+"""Base classes of handling errors: a change from a dwell on, an error of one unit, of a single axis, of the pose angles."""
 
 from abc import abstractmethod
 from typing import ClassVar
@@ -15,37 +15,37 @@ _EVERY = 160
 
 
 def every_dwell(lot: Lot) -> list[int]:
-    """Dwells from which on a bias may have changed.
+    """Candidate first dwells of a changed bias.
 
-    A jump that is missed by one dwell explains half of itself, and a step in time between two dwells all of it. A jump after the
-    first dwell, or before the last, is one bad dwell.
+    A jump located one dwell off explains half of it, while a step in time between two dwells explains all of it. A jump after
+    the first dwell, or before the last, is one bad dwell.
     """
     n = lot.state.time.shape[1]
     return list(range(2, n - 1)) if n <= _EVERY else times(lot)
 
 
 class Change(Handling):
-    """What all units have in addition from a dwell on."""
+    """A change of all units from a dwell on."""
 
     @abstractmethod
     def addition(self, lot: Lot) -> Array:
-        """Columns (units or 1, n, 3, k) of the change as if it were there in all dwells, g per unit of the coefficient."""
+        """Columns (units or 1, n, 3, k), g per unit of the coefficient, of the change if it were present in all dwells."""
 
     def moments(self, lot: Lot) -> list[int]:
-        """Dwells from which on the change is searched."""
+        """Candidate first dwells of the change."""
         return times(lot)
 
     def locations(self, lot: Lot) -> list[dict[str, float]]:
-        """The dwells from which on a change is possible."""
+        """The candidate first dwells as locations."""
         return [{"dwell": float(k)} for k in self.moments(lot)]
 
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
-        """The addition from the dwell on."""
+        """:meth:`addition`, zero before the dwell."""
         return self.addition(lot) * after(lot, location["dwell"])[:, None, None]
 
 
 class OfOneUnit(Handling):
-    """The error of the next base class where one unit alone has it."""
+    """The error of the next base class, restricted to one unit."""
 
     in_part = False
 
@@ -74,7 +74,7 @@ class OfOneAxis(Handling):
 
     @abstractmethod
     def levels(self, lot: Lot, **location: float) -> Array:
-        """Columns (n, k) of the axis."""
+        """Columns (n, k) of the axis, g per unit of the coefficient."""
 
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
         """The columns of the axis; none in the others."""
@@ -89,9 +89,9 @@ class OfOneAxis(Handling):
 
 
 class DirectionOff(Handling):
-    """A wrong direction in some dwells, for all units: its two errors identify the dwells, and do not correct them.
+    """A wrong direction in some dwells of all units; the dwells are left out, not corrected by the two fitted angles.
 
-    which : the dwells that are off, and that they are left out
+    which : text that says which dwells are wrong and left out
     """
 
     symbol = "Δα, Δβ"
@@ -110,7 +110,7 @@ class DirectionOff(Handling):
         return f"the pose was off by about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner) {self.which}"
 
     def mended(self, lot: Lot, size: Array, **location: float) -> Lot | None:
-        """Without the dwells."""
+        """The lot without these dwells."""
         return without(lot, self.dwells(lot, **location))
 
 

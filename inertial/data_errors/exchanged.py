@@ -1,7 +1,7 @@
-"""Pairs of units whose readings were exchanged for a range of dwells, by their residuals after a plain fit.
+"""Pairs of units whose readings were exchanged for a range of dwells, found by their residuals after a plain fit.
 
-What one of the two has too much the other lacks, so that their residuals are opposite; with the readings exchanged back they
-vanish. A look at all pairs costs one product of the residuals with themselves.
+The residuals of the two units are opposite and vanish with the readings exchanged back. The correlations of all pairs take one
+product of the residuals with themselves.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -20,26 +20,26 @@ _OPPOSITE = -0.5
 """Correlation of the residuals of two units below which they may have been exchanged."""
 
 _TOGETHER = 256
-"""First dwells of a range that are looked at together: a record of ten thousand dwells has fifty million ranges."""
+"""Number of first dwells processed at a time: a record of ten thousand dwells has fifty million ranges."""
 
 _LEFT = 0.5
-"""Share of the squares of both that is left with the readings exchanged back."""
+"""Largest share of both units' sums of squares that may remain with the readings exchanged back."""
 
 _MANY = 4
-"""Units from which the median over the units is what they have in common."""
+"""Smallest number of units whose median is subtracted as common to all units."""
 
 _WARM = 1.0
 """Range of temperature, K, from which on the fit has slopes over it."""
 
 
 class PlainFit:
-    """Bias, response and their slopes over temperature of every unit, by least squares.
+    """Least-squares fit of bias, response and their temperature slopes for every unit.
 
     Parameters
     ----------
-    output : (units, n, 3); force : (units, n, 3), g; theta : (units, n), K, None where unknown
-    there : (units, n), which units have which dwells
-    of_other : outputs (2, n, 3) of two units, each as that of the other
+    output : (units, n, 3), output unit; force : (units, n, 3), g; theta : (units, n), K, None where unknown
+    there : (units, n), whether a unit has a dwell
+    of_other : function of two unit indices: their outputs (2, n, 3) exchanged, each in the scale of the other unit
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class PlainFit:
         self.left = self.output - self.basis @ (np.swapaxes(self.basis, -1, -2) @ self.output)
 
     def pairs(self) -> Iterator[tuple[int, int]]:
-        """Pairs of units, each of which has the residuals that are most opposite to the other's."""
+        """Pairs of units with opposite residuals, each the unit most opposite to the other."""
         units = len(self.left)
         deviations = self.left - np.median(self.left, axis=0) if units >= _MANY else self.left
         flat = deviations.reshape(units, -1)
@@ -76,10 +76,10 @@ class PlainFit:
                 yield a, int(partner[a])
 
     def ranges(self, unit: int, partner: int, around: int = AROUND) -> list[tuple[int, int]]:
-        """Ranges of dwells (first, end) in which an exchange of two units leaves least; none if it leaves too much.
+        """Ranges of dwells (first, end) in which exchanging back leaves the smallest residuals; empty if these are too large.
 
-        The end of most is that of the record; units that came back into their seats before it were exchanged for a while. Beside
-        the best range others whose first or whose last dwell is near.
+        Most exchanges last until the end of the record; others end when the units are put back into their seats. Ranges near the
+        best one, with another first or last dwell, are included.
         """
         pair = [unit, partner]
         changes = self._changes(pair)
@@ -88,23 +88,23 @@ class PlainFit:
         total = float(np.sum(self.left[pair] ** 2))
         if total <= 0.0 or not first.size:
             return []
-        lasting = (int(first[np.argmin(_left_by(changes, first, end[-1:])[:, 0])]), n)
-        each = [_best_of(changes, first[k : k + _TOGETHER], end) for k in range(0, first.size, _TOGETHER)]
+        lasting = (int(first[np.argmin(_change_of_squares(changes, first, end[-1:])[:, 0])]), n)
+        each = [_best_range(changes, first[k : k + _TOGETHER], end) for k in range(0, first.size, _TOGETHER)]
         found: dict[tuple[int, int], float] = {}
         for a, b in {lasting, min(each)[1]}:
-            if total + float(_left_by(changes, np.array([a]), np.array([b]))[0, 0]) > _LEFT * total:
+            if total + float(_change_of_squares(changes, np.array([a]), np.array([b]))[0, 0]) > _LEFT * total:
                 continue
             near = [(k, b) for k in range(a - around, a + around + 1)]
             near += [(a, k) for k in range(b - around, b + around + 1) if b < n]
             for k, m in near:
                 if first[0] <= k <= first[-1] and k + EDGE <= m <= (n if b == n else n - EDGE):
-                    found[k, m] = float(_left_by(changes, np.array([k]), np.array([m]))[0, 0])
+                    found[k, m] = float(_change_of_squares(changes, np.array([k]), np.array([m]))[0, 0])
         return sorted(found, key=lambda dwells: found[dwells])
 
     def _changes(self, pair: list[int]) -> list[tuple[Array, Array]]:
-        """Running sums for each unit and axis, of dᵀd + 2·rᵀd, (n + 1,), and of Qᵀd, (n + 1, k).
+        """Running sums, for each of the two units and axis, of dᵀd + 2·rᵀd, (n + 1,), and of Qᵀd, (n + 1, k).
 
-        d is the readings of the other unit less its own, r what the fit leaves, Q the basis of the fit.
+        d is the readings of the other unit less those of the unit, r the residuals of the fit, Q the basis of the fit.
         """
         both = np.all(self.there[pair], axis=0, keepdims=True).T
         apart = np.where(both, self.of_other(*pair) - self.output[pair], 0.0)
@@ -115,8 +115,8 @@ class PlainFit:
         return sums
 
 
-def _left_by(changes: Sequence[tuple[Array, Array]], first: Places, end: Places) -> Array:
-    """What exchanges in ranges of dwells add to the squares of two units, (first, end); infinite where a range is too short.
+def _change_of_squares(changes: Sequence[tuple[Array, Array]], first: Places, end: Places) -> Array:
+    """Change of both units' sum of squares by exchanging ranges of dwells, (first, end); infinite where a range is too short.
 
     ‖r + c‖² of the columns c = P·H·d, from running sums: cᵀc = dᵀHd − (QᵀHd)², rᵀc = rᵀHd.
     """
@@ -127,9 +127,9 @@ def _left_by(changes: Sequence[tuple[Array, Array]], first: Places, end: Places)
     return np.where(end - first[:, None] < EDGE, np.inf, squares)
 
 
-def _best_of(changes: Sequence[tuple[Array, Array]], first: Places, end: Places) -> tuple[float, tuple[int, int]]:
-    """The range that leaves least, and what it adds."""
-    squares = _left_by(changes, first, end)
+def _best_range(changes: Sequence[tuple[Array, Array]], first: Places, end: Places) -> tuple[float, tuple[int, int]]:
+    """The smallest change of the sum of squares, and its range of dwells (first, end)."""
+    squares = _change_of_squares(changes, first, end)
     a, b = np.unravel_index(int(np.argmin(squares)), squares.shape)
     return float(squares[a, b]), (int(first[a]), int(end[b]))
 

@@ -10,12 +10,12 @@ from inertial.frames import shown_force
 from inertial.state import ALL_AXES
 
 STANDARD_GRAVITY = 9.80665  # m/s² in one g
-_TURNED = 0.05  # singular value, per root of a dwell, below which poses do not separate response and bias
+_TURNED = 0.05  # singular value of the design over √dwells, below which poses do not separate response and bias
 _WARM = 2.5
-"""Departure of the temperature from its mean, K, from which on its linear terms are taken out of the output."""
+"""Largest deviation of the temperature from its mean, K, up to which no slope of the bias is subtracted from the output."""
 
 FAR_G = 0.02
-"""Misfit, g, from which on a dwell may be in another pose: more than the gain of a device changes between two soaks."""
+"""Misfit, g, above which a dwell may be in another pose: more than a device's gain changes between two soaks."""
 
 _ROUNDS = 12  # of reweighting
 _TUKEY = 4.685
@@ -27,8 +27,8 @@ class Readings:
     """Readings of a lot, dwells in the order of their numbers; NaN where a unit lacks a dwell.
 
     force : (units, n, 3), g, commanded
-    output, spread : (units, n, 3), output unit; mean and standard deviation of a sample; spread None if not recorded
-    slow : (units, n, 3), output unit; deviation by which means are uncertain, :data:`inertial.quantities.SLOW_COLUMNS`; or None
+    output, spread : (units, n, 3), output unit; mean, and standard deviation of the samples (None if not recorded)
+    slow : (units, n, 3), output unit; equivalent white deviation of :data:`inertial.quantities.SLOW_COLUMNS`; or None
     count : (units, n), samples averaged; duration : (units, n), s; each None if not recorded
     time : (units, n), s
     temperature, chamber, vibration : (units, n), °C, °C, g; None if not recorded
@@ -53,13 +53,13 @@ class Readings:
 
     @cached_property
     def there(self) -> Flags:
-        """Which units have which dwells, (units, n)."""
+        """Whether each unit has each dwell, (units, n)."""
         there: Flags = np.all(np.isfinite(self.output), axis=-1)
         return there
 
     @property
     def mean_error(self) -> Array | None:
-        """Standard errors of the means, (units, n, 3), output unit, as the samples show them; None if not recorded."""
+        """Standard errors of the dwell means from their samples, (units, n, 3), output unit; None if not recorded."""
         deviation = self.spread if self.slow is None else self.slow
         if deviation is None or self.count is None:
             return None
@@ -67,12 +67,12 @@ class Readings:
 
     @property
     def warm(self) -> Array | None:
-        """Temperature of the units, or of the chamber where that alone was recorded, (units, n), °C."""
+        """Temperature of the units, else of the chamber, (units, n), °C; None if neither was recorded."""
         return self.temperature if self.temperature is not None else self.chamber
 
     @cached_property
     def turned(self) -> bool:
-        """Whether the poses separate response and bias; else faults of response cannot be detected."""
+        """Whether the poses separate response and bias; otherwise faults of the response cannot be detected."""
         x = design(self.force[0][:, self.axes])
         return bool(np.linalg.svd(x, compute_uv=False)[-1] > _TURNED * np.sqrt(len(x)))
 
@@ -89,9 +89,9 @@ class Readings:
         )
 
     def _nominal(self, force: Array, output: Array) -> Array:
-        """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the norm of an output over that of its force.
+        """Bias and nominal response, (m, 4): 1 for g, 9.80665 for m/s², else the median norm of output over that of force.
 
-        Of each dwell by itself: the mean output of a tumble about one axis is its bias, and no response.
+        The norms are those of single dwells, because the mean output of a tumble about one axis is its bias.
         """
         known = {"g": 1.0, "m/s^2": STANDARD_GRAVITY}
         felt = force[:, self.axes]
@@ -107,10 +107,10 @@ class Readings:
 
     @cached_property
     def without_bias_slope(self) -> "Readings":
-        """The same readings less what a straight line of the bias over the temperature adds, with :attr:`fits` that follow.
+        """The readings less a linear temperature dependence of the bias; their :attr:`fits` are computed anew.
 
-        The line is fitted together with a steady response, robustly: of a sensor of 1 mg/K the dwells of a cold soak would else
-        count as other poses, while slopes of the response, too, could take up a wrong pose of a short plan.
+        The slope is fitted robustly with a constant response. Without it, a sensor of 1 mg/K would seem to be in other poses in a
+        cold soak; with slopes of the response as well, the fit of a short plan could absorb a wrong pose.
         """
         warm = self.warm
         if warm is None or not self.turned or not np.isfinite(warm[self.there]).all():
@@ -126,9 +126,9 @@ class Readings:
 
     @cached_property
     def misfit_when_warm(self) -> Array:
-        """The misfit to a robust fit with slopes over the temperature, (units, n, 3), g; :attr:`misfit` where none was recorded.
+        """Residuals of a robust fit with temperature slopes, (units, n, 3), g; :attr:`misfit` where no temperature is recorded.
 
-        Of a sensor of 1 mg/K the dwells of a cold soak would else be far from those of the others.
+        Without slopes, dwells of a cold soak of a sensor with 1 mg/K would be far from the others.
         """
         warm = self.warm
         if warm is None or not self.turned or not np.isfinite(warm[self.there]).all():
@@ -142,27 +142,27 @@ class Readings:
 
     @cached_property
     def misfit(self) -> Array:
-        """Output less the robust fit, over the unit's scale: g, (units, n, 3)."""
+        """Residuals of the robust fit over the unit's scale, (units, n, 3), g."""
         model = np.einsum("unp,uip->uni", design(self.force), self.fits)
         return (self.output - model) / np.where(self.scale > 0.0, self.scale, 1.0)[:, None, None]
 
 
 def design(force: Array, theta: Array | None = None) -> Array:
-    """Columns (..., 4) of bias and response to a force (..., 3), g; with a temperature (...,), K, their slopes too, (..., 8)."""
+    """Columns (..., 4) of bias and response for a force (..., 3), g; with a temperature (...,), K, and their slopes, (..., 8)."""
     x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
     return x if theta is None else np.concatenate([x, theta[:, None] * x], axis=-1)
 
 
 def robust_fit(force: Array, output: Array, theta: Array | None = None, *, least: float = 0.0) -> Array:
-    """Bias and response (3, 4) that the majority of dwells agrees on: least squares reweighted by Tukey's biweight.
+    """Robust bias and response (3, 4), output unit, by least squares reweighted with Tukey's biweight.
 
-    Dwells are weighed by the norm of their residual over the three axes, so that a wrong pose loses all three together.
+    Dwells are weighted by the norm of their residual over the three axes, so that a wrong pose loses weight on all three.
 
     Parameters
     ----------
-    theta : (n,), temperature above the reference, K: the slopes of all four over it are fitted too, and follow them, (3, 8)
-    least : residual, output unit, up to which a dwell counts in full: where many dwells agree closely, those of another
-        temperature would else have no weight
+    theta : (n,), temperature above the reference, K; then the temperature slopes are fitted too and appended, (3, 8)
+    least : residual norm, output unit, up to which a dwell has full weight: where many dwells agree closely, dwells at another
+        temperature would otherwise have no weight
     """
     there = np.isfinite(output).all(axis=-1)
     x, y = design(force, theta)[there], output[there]
@@ -174,7 +174,7 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None, *, least
         middle = float(np.median(size))
         if middle <= 0.0:
             break
-        # absolute values first: they reject outliers between which the biweight could remain
+        # least absolute deviations first: started from least squares, the biweight could converge between outliers
         u = size / (_TUKEY * max(1.5 * middle, least))
         weight = (
             np.sqrt(1.0 / np.maximum(size, max(0.1 * middle, least)))
@@ -190,7 +190,7 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None, *, least
 class Split:
     """A change of calibration in the middle of a run.
 
-    dwell : first after it; before, after : (4, 3), bias and response on both sides; ratio : of the scales
+    dwell : index of the first dwell after it; before, after : (4, 3), output unit, bias and response on both sides
     """
 
     dwell: int
@@ -205,16 +205,16 @@ class Split:
 
 
 _LEAST = 6  # dwells on either side of a split: a response and a bias need four
-_BETTER = 0.05  # largest ratio of the squares of two fits to those of one
+_BETTER = 0.05  # largest ratio of the sum of squares of two fits to that of one
 _FAR = 4.0  # multiple of that ratio above which rounding cannot hide a split
-_FIXED = 1e-9  # eigenvalue of the products, over the largest, below which poses do not fix a direction
+_FIXED = 1e-9  # relative eigenvalue of the Gram matrix below which the poses do not determine a direction
 
 
 def find_split(force: Array, output: Array) -> Split | None:
-    """The dwell from which on another calibration explains a run far better than one does; None if one is enough.
+    """The split of a run into two parts with different calibrations; None if one calibration suffices.
 
-    Two fits must leave less than a twentieth of the squares of one, and differ by more than a hundredth of
-    the scale: no physical effect changes a sensor so.
+    Two fits must leave less than a twentieth of the sum of squares of one, and differ by more than a hundredth of the scale: no
+    physical effect changes a sensor as much.
     """
     there = np.flatnonzero(np.isfinite(output).all(axis=-1))
     if there.size < 2 * _LEAST + 1:
@@ -236,7 +236,7 @@ def find_split(force: Array, output: Array) -> Split | None:
 
 
 def _far_from_split(force: Array, output: Array, cuts: Places) -> bool:
-    """Whether no split of the dwells (k,) comes near to what is needed, by the products of all dwells up to each."""
+    """Whether no split at the dwells ``cuts`` (k,) comes near the required ratio, by cumulative Gram matrices."""
     x = design(force)
     left = output - x @ np.linalg.lstsq(x, output, rcond=1e-9)[0]
     both = np.concatenate([x, left], axis=-1)
@@ -252,13 +252,14 @@ def _far_from_split(force: Array, output: Array, cuts: Places) -> bool:
 
 
 def _plain_fit(force: Array, output: Array) -> tuple[Array, float]:
+    """Least-squares bias and response (4, 3), output unit, and the residual sum of squares."""
     x = design(force)
     coefficients = np.linalg.lstsq(x, output, rcond=1e-9)[0].astype(np.float64)
     return coefficients, float(np.sum((output - x @ coefficients) ** 2))
 
 
 def exchanged(split: Split, other: Split) -> bool:
-    """Whether two units took over each other's calibration at the same dwell."""
+    """Whether two units exchanged their calibrations at the same dwell, within two dwells."""
     if abs(split.dwell - other.dwell) > 2:
         return False
     apart = float(np.linalg.norm(split.after - split.before)) + float(np.linalg.norm(other.after - other.before))

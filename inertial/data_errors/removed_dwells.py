@@ -11,14 +11,14 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 
 DwellIndex = tuple[int, int]
-"""Indices of a unit and of its dwell."""
+"""Index of a unit and index of a dwell."""
 
 
 @dataclass(frozen=True)
 class BadDwell:
-    """A dwell of one unit: its deviation from its neighbours in time and the model.
+    """A bad dwell of one unit, with its deletion residual.
 
-    off : (axes,), g; by_axis : (axes,), in standard deviations; tail : whether the noise of the run reaches as far
+    off : (axes,), g, deviation; by_axis : (axes,), the same in standard deviations; tail : whether it is within the noise's tails
     """
 
     unit: int

@@ -1,13 +1,13 @@
 """Tails of the noise: the limit for bad dwells where large deviations are frequent.
 
-The noise of a dwell is modelled as a normal part plus a Student t part of three degrees of freedom, which has an unknown share of
-the variance; few noises have heavier tails. Before the data every share is as likely as any other: small ones, which no number of
-dwells excludes, then count little in a lot whose dwells show no tails. The posterior distribution of the share uses the
-likelihood of the deletion residuals of the kept dwells, truncated at the smallest value that was left out: it holds whether or
-not the dwells left out belong to the tail of the noise. Whitened residuals cannot be used, because whitening spreads the error of
-one dwell over the dwells after it.
-A dwell counts as tail of the noise where such noise gives a deviation as large in one of the dwells of the run with more than a
-stated probability. The size of a deviation is its length, and the product of the probabilities of its axes: noise that is
+The noise of a dwell is modelled as a normal part plus a Student t part of three degrees of freedom with an unknown share of the
+variance; few noises have heavier tails. The prior density of the share is flat: small shares, which no number of dwells excludes,
+then count little in a lot whose dwells show no tails. The posterior uses the likelihood of the other dwells' deletion residuals,
+truncated at the smallest value that was left out, and so holds whether or not the dwells left out belong to the tail.
+Whitened residuals cannot be used, because whitening spreads the error of one dwell over the dwells after it.
+
+A dwell counts as tail of the noise where such noise gives as large a deviation in any dwell of the run with more than a stated
+probability. The size of a deviation is judged by its length and by the product of the probabilities of its axes: noise that is
 independent on three axes is seldom large on two of them at once.
 
 Whether the tails of a lot are heavy is judged by the kurtosis of its residuals (Anscombe & Glynn, Biometrika 70 (1983) 227).
@@ -45,15 +45,15 @@ _TAIL = 8.0
 """Standard deviations beyond which only the heavy part counts."""
 
 _FEWEST = 60
-"""Number of values needed to distinguish tails from those of a normal distribution."""
+"""Smallest number of values for a test of their tails."""
 
 
 def with_tails(model: Model, removed: Sequence[BadDwell]) -> list[BadDwell]:
-    """Dwells that were left out of a model, each marked where the tails of the noise of the other dwells explain its deviation.
+    """The removed dwells, with ``tail`` set where the tails of the other dwells' noise explain the deviation.
 
     Parameters
     ----------
-    model : without these dwells
+    model : the model without these dwells
     """
     values = np.abs(deletion_residuals(model))
     if not removed or values.size < _FEWEST:
@@ -70,9 +70,9 @@ def heavy(values: Array) -> bool:
 
 @dataclass(frozen=True)
 class _Noise:
-    """Distribution of the share of heavy tails and of the scale of a noise.
+    """Joint posterior of the share of heavy tails and of the scale of a noise.
 
-    weight : (shares, scales), their probability; scale : (scales,)
+    weight : (shares, scales), probabilities; scale : (scales,), standard deviations
     """
 
     weight: Array
@@ -80,7 +80,7 @@ class _Noise:
 
     @staticmethod
     def of(values: Array, below: float) -> "_Noise":
-        """The distribution, given absolute values (m,) of which only those ``below`` are known to be noise."""
+        """The posterior, given absolute values (m,) of which only those smaller than ``below`` are known to be noise."""
         inside = values[values < below]
         scale = _SCALES * float(np.sqrt(np.mean(inside**2)))
         log = np.empty((len(_SHARES), scale.size))
@@ -108,7 +108,7 @@ class _Noise:
 
 
 def _probability_beyond(index: int, z: Array) -> Array:
-    """P(|x| > z) of a value of variance one; ``index``: of its share of heavy tails in ``_SHARES``."""
+    """P(|x| > z) of a value of variance one; ``index``: index of its share of heavy tails in ``_SHARES``."""
     share = _SHARES[index]
     if share == 0.0:
         return 2.0 * normal_tail(z)
@@ -119,7 +119,7 @@ def _probability_beyond(index: int, z: Array) -> Array:
 
 @cache
 def _table(index: int) -> tuple[Array, Array, Array]:
-    """Values from zero on, density and distribution of a normal part plus a heavy one, together of variance one."""
+    """Grid from zero on, density and distribution function of a normal plus a heavy-tailed part of total variance one."""
     share, half = _SHARES[index], round(_FURTHEST / _STEP)
     grid = _STEP * np.arange(-half, half + 1)
     edges = np.append(grid - 0.5 * _STEP, grid[-1] + 0.5 * _STEP)

@@ -1,9 +1,9 @@
-"""Correlations of the coefficients of units, with the correlated errors of their fits taken out.
+"""Correlations between coefficients over units, corrected for the correlated errors of their fits.
 
-A plan that is not centred makes the errors of a bias and of its temperature coefficient alike: over thousands of units they
-correlate although nothing in the devices does. A lot says Σ(a·b) − (1 − 1/n)·ΣC of a pair, a and b about the means of the lot, C
-the covariance of the fit; its mean is zero where the devices' own values do not correlate, and evidence over the lots is valid
-however often it is looked at.
+In a plan that is not centred, the errors of a bias and of its temperature coefficient are correlated; over thousands of units the
+estimates then correlate although the true values do not. For a pair of coefficients each lot contributes
+Σ(a·b) − (1 − 1/n)·ΣC, with a and b about the means of the lot and C the covariance of the fit. Its mean is zero where the true
+values are uncorrelated, and the evidence over the lots remains valid however often it is evaluated.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from inertial.discovery.station_wander import over
 
 @dataclass(frozen=True)
 class Correlation:
-    """Two coefficients of an axis, by their indices: evidence, correlation of the devices' own values, its standard error."""
+    """Two coefficients of an axis, by index: log evidence, correlation of the true values, and its standard error."""
 
     axis: int
     first: int
@@ -28,7 +28,7 @@ class Correlation:
 
 
 class Correlations:
-    """Sums of lots, in the order of their measurement."""
+    """Accumulated sums of products of the lots, in the order of their measurement."""
 
     def __init__(self) -> None:
         self._lots: list[Array] = []
@@ -49,7 +49,7 @@ class Correlations:
         self.units += n
 
     def found(self, alpha: float) -> list[Correlation]:
-        """Pairs that correlate, the strongest first; the probability of one where none does is at most ``alpha``."""
+        """Correlated pairs, the strongest first; the probability of any false one is at most ``alpha``."""
         if len(self._lots) < FIRST:
             return []
         every = np.array(self._lots)
@@ -58,7 +58,7 @@ class Correlations:
         pairs = every[:, :, first, second].reshape(len(every), -1)
         needed = np.log(pairs.shape[1] / alpha) if pairs.shape[1] else np.inf
         log_e = _evidence(pairs)
-        variance = np.diagonal(every.sum(axis=0), axis1=1, axis2=2)  # (axes, p), of the devices' own values
+        variance = np.diagonal(every.sum(axis=0), axis1=1, axis2=2)  # (axes, p), of the true values
         both = np.sqrt(np.maximum(variance[:, first] * variance[:, second], 0.0)).reshape(-1)
         known = (variance[:, first] > 0.0) & (variance[:, second] > 0.0)
         value, error = over(pairs.sum(axis=0), both), over(np.sqrt((pairs**2).sum(axis=0)), both)
@@ -71,7 +71,7 @@ class Correlations:
 
 
 def _evidence(increments: Array) -> Array:
-    """Logarithm of the evidence (h,) of increments (lots, h), each bounded by what came before; medians begin."""
+    """Log evidence (h,) of increments (lots, h), each bounded by the scale of earlier ones; it starts from medians."""
     spread = np.median(np.abs(increments[:FIRST]), axis=0) / NORMAL_MEDIAN
     scale = Scale(np.where(spread > 0.0, spread, 1.0))
     sums = Sums.of(increments.shape[1], two_sided=True)

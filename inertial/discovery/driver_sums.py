@@ -1,4 +1,4 @@
-"""Sums of a driver over all lots, level by level, and how much of each level is in a lot: what names are found with."""
+"""Sums of scores and information of a driver over all lots, by level, and the weight of each level in each unit."""
 
 import warnings
 from collections import Counter
@@ -13,16 +13,16 @@ from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredL
 from inertial.discovery.station_wander import over
 
 INSIDE_ONLY = {SLOT, UNIT}
-"""Drivers that are judged by differences inside a lot alone."""
+"""Drivers that are judged only by differences within a lot."""
 
 
 @dataclass
 class DriverSums:
     """Sums of a driver by level, in units of the noise of the lots.
 
-    levels : by label ("slope" or "all" where the driver has none): score and information, (2, h) · units : of each level
-    about : what a number is counted from
-    inside, between : information of differences inside lots, and of what lots have in common
+    levels : score and information, (2, h), by label ("slope" or "all" for a driver without levels)
+    units : number of units of each level · about : origin from which a numerical driver is counted
+    inside, between : information from differences within lots, and from the means of lots
     """
 
     levels: dict[str, Array] = field(default_factory=dict[str, Array])
@@ -48,7 +48,7 @@ class DriverSums:
 
     @property
     def mixed(self) -> bool:
-        """Whether most is known from differences inside lots: then the products of the columns are those inside lots."""
+        """Whether most information comes from differences within lots, so that the columns' products within lots apply."""
         return self.inside > self.between
 
     def add(self, label: str, score: Array, information: Array, units: int) -> None:
@@ -59,7 +59,7 @@ class DriverSums:
 
 
 def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, DriverSums]:
-    """Sums of drivers over lots: between and inside lots together."""
+    """Sums of drivers over lots, from differences between and within lots together, by driver."""
     means = _station_means(lots)
     noise, within = _noise(lots, means)
     out = {name: DriverSums() for name in drivers}
@@ -71,6 +71,7 @@ def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, Dri
 
 
 def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
+    """Mean of a numerical driver over the lots that have it; zero if none has."""
     values = [
         lot.day if name == DATE else float(lot.numbers[name].mean())
         for lot in lots
@@ -80,13 +81,13 @@ def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
 
 
 def shrinkage(size: Array, information: Array) -> Array:
-    """Factors (p,) by which the sizes of levels are drawn to zero: the part of their variance that is not noise."""
+    """Factors (p,) for shrinking the sizes (levels, p) towards zero: the share of their variance that is not noise."""
     noise = over(np.ones_like(information), information).sum(axis=0)
     return np.clip(1.0 - noise / np.maximum((size**2).sum(axis=0), 1e-300), 0.0, 1.0)
 
 
 def weights_of(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
-    """How much of each level is in each unit, (units, levels)."""
+    """Weight of each level in each unit, (units, levels): 1 or 0, or a numerical driver's value about its origin."""
     units = len(lot.units)
     out = np.zeros((units, len(sums.labels)))
     if driver == MEAN:
@@ -104,7 +105,7 @@ def weights_of(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
 
 
 def about_common(driver: str, sums: DriverSums) -> Array:
-    """Scores (g, h) of levels; of a driver that is seen inside lots only, about what all levels have in common."""
+    """Scores (g, h) of levels; for a driver judged within lots only, about the mean over all levels."""
     if driver not in INSIDE_ONLY or len(sums.labels) < 2:
         return sums.score
     total = sums.information.sum(axis=0)
@@ -113,7 +114,7 @@ def about_common(driver: str, sums: DriverSums) -> Array:
 
 
 def _station_means(lots: Sequence[ScoredLot]) -> dict[str, Array]:
-    """Mean size (h,) of each station's lots."""
+    """Mean size (h,) over each station's lots, by station."""
     score, info = dict[str, Array](), dict[str, Array]()
     for lot in lots:
         zero = np.zeros(lot.information.size)
@@ -123,7 +124,7 @@ def _station_means(lots: Sequence[ScoredLot]) -> dict[str, Array]:
 
 
 def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float, float]:
-    """Variance of lots about their stations over the stated one, and of units inside lots: medians over effects and lots."""
+    """Variance over the stated one, of lots about their station's mean and of units within lots; medians over all."""
     between, within = list[Array](), list[Array]()
     for lot in lots:
         info = np.where(lot.information > 0.0, lot.information, np.nan)
@@ -145,7 +146,7 @@ def _gather(
     about: Mapping[str, float],
     seen: Mapping[str, int],
 ) -> None:
-    """Add a lot to the sums of drivers; a unit that was measured once says nothing of what stays with a unit."""
+    """Add a lot to the sums of drivers; ``scale``: as of :func:`_noise`, ``seen``: lots of each unit, which must be several."""
     noise, within = scale
     by_unit, total, info, left = lot.own, lot.total, lot.information, lot.inside[0]
     sums = np.where(info > 0.0, lot.score.sum(axis=0), 0.0)
@@ -167,7 +168,7 @@ def _gather(
                 score = left[here].sum(axis=0) / within
                 information = of_level * (1.0 - of_level / total) / within
                 of.inside += float(information.sum())
-                if name not in INSIDE_ONLY:  # and what the lot has in common
+                if name not in INSIDE_ONLY:  # add the information of the lot's mean
                     share = of_level / total
                     score = score + share * sums / noise
                     common = share**2 * info / noise
@@ -178,7 +179,7 @@ def _gather(
 
 
 def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array, Array, float, float]) -> None:
-    """Add a lot to the regression on a number; the offset and the slope of the number are taken out by its mean beforehand."""
+    """Add a lot to the regression on a number, (units,) about its origin; parts: lot, scores in it, station mean, noise."""
     lot, left, mean, noise, within = parts
     if not np.isfinite(numbers).all():
         return

@@ -1,10 +1,10 @@
-"""Evidence over the lots of an archive, valid at any night: a supermartingale for every effect and driver.
+"""Evidence over the lots of an archive, valid at any time: a supermartingale (e-process) for every effect and driver.
 
-Each lot gives each hypothesis one number x that is symmetric about zero where there is nothing, given all earlier lots. Then
+Each lot gives each hypothesis a number x that, given all earlier lots, is symmetric about zero under the null hypothesis. Then
 exp(λS − λ²V/2) with S = Σx and V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004), and the
-probability that its mean over some λ ever exceeds m/α is at most α/m (Ville). Nothing is assumed of the size of the noise.
-Beside every column on every axis stands each effect as a whole: the increments of its columns add, as the scores of a lot are
-symmetric together.
+probability that its mean over some λ ever exceeds m/α is at most α/m (Ville). Nothing is assumed about the size of the noise.
+The hypotheses are every column on every axis and, in addition, each effect with all its columns: their increments add, because
+the scores of a lot are jointly symmetric.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,32 +21,32 @@ from inertial.discovery.running_sums import BOUND, FIRST, Levels, Scale, Sums
 from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander, over
 
 SHRUNK = 4.0
-"""Typical lots by whose information the predicted size of a level is drawn towards none."""
+"""Prior information, in typical lots, that shrinks the predicted size of a level towards zero."""
 
 MEAN, DATE, STATION, SLOT, UNIT = "mean", "date", "station", "slot", "unit"
 INSIDE = ", inside lots"
-"""Ending of the name of a driver that is judged by differences inside a lot: whatever the lot has in common cancels."""
+"""Suffix of the name of a driver that is judged by differences within a lot, in which common errors cancel."""
 
 SHARED: float = float(np.log(300.0))
-"""Logarithm of the odds from which on a mean is taken to be of the sensors, and not of the stations' references."""
+"""Log odds from which on a mean is attributed to the sensors, not to the stations' references."""
 
 _SHARED_ON_AXES, _SHARED_ON_ONE = 0.005, 0.1
-"""Probabilities, of references that differ at random between stations, that they agree so well on all axes of a column together,
-and on the axis itself: four stations reach the odds above on one axis with 0.6 %."""
+"""Limits of the probability that references differing at random between stations agree as well, on all axes of a column together
+and on the axis alone; four stations reach the odds above on one axis with 0.6 %."""
 
 SLOPE, ALL = "slope", "all"
-"""Sums of a number that differs by axis: what its slope is estimated from, and the information of all units."""
+"""Labels of the sums of a number that differs by axis: for its slope, and for the information of all units."""
 
 
 @dataclass(frozen=True)
 class ScoredLot:
-    """Scores of a lot in the order of an archive's hypotheses.
+    """Scores of a lot in the order of an archive's h hypotheses.
 
-    score : (units, h), errors of the station taken out · own : (units, h), information before that
-    information : (h,), of the sums, errors of the station taken out
-    levels : driver → label of each unit, "" where it is not known · numbers : driver → (units,), nan where not known
-    slopes : driver → (units, h), numbers that differ by axis, judged inside the lot alone
-    day : since an epoch
+    score : (units, h), errors of the station eliminated · own : (units, h), information before the elimination
+    information : (h,), of the sums over the units, errors of the station eliminated
+    levels : driver → label of each unit, "" if unknown · numbers : driver → (units,), nan if unknown
+    slopes : driver → (units, h), numbers that differ by axis, judged within the lot only
+    day : days since an epoch
     """
 
     run: str
@@ -62,16 +62,16 @@ class ScoredLot:
 
     @cached_property
     def total(self) -> Array:
-        """Information of all units, (h,), errors of the station not taken out; never zero."""
+        """Information summed over the units, (h,), before elimination of the station's errors; never zero."""
         return np.maximum(self.own.sum(axis=0), 1e-300)
 
     @cached_property
     def inside(self) -> tuple[Array, Array]:
-        """Scores of the units about their mean, and the information in them, (units, h)."""
+        """Scores of the units about the lot's mean, and their information, (units, h) each."""
         return self.score - self.own * self.score.sum(axis=0) / self.total, self.own * (1.0 - self.own / self.total)
 
     def averaged(self, of_units: Array) -> Array:
-        """The mean (h,) of a size (units, h) over the units, by their information."""
+        """Mean (h,) of sizes (units, h) over the units, weighted by their information."""
         return (of_units * self.own).sum(axis=0) / self.total
 
 
@@ -80,9 +80,9 @@ class Evidence:
 
     Parameters
     ----------
-    count : number of effects' columns and axes, h
-    earlier : scores and information (h,) inside its lots of a unit's measurements among the first n lots; None without one
-    columns : (k,), number of the effect of each column; hypotheses are axes × columns. None: each stands for itself
+    count : number of hypotheses, h = axes × columns of effects
+    earlier : function of unit and n: summed scores and information (h,) of the unit within the first n lots; None if unmeasured
+    columns : (k,), index of the effect of each column; None: no effects with several columns
     """
 
     def __init__(
@@ -116,27 +116,27 @@ class Evidence:
 
     @property
     def size(self) -> int:
-        """Number of hypotheses with the effects as wholes, which come last."""
+        """Number of hypotheses, with those of effects with all their columns at the end."""
         return self.count + (0 if self.effects is None else int(self.effects.max(initial=-1)) + 1)
 
     @property
     def guarded(self) -> Flags:
-        """Effects (h,) for which the stations wander by themselves: what is constant in a lot may be that."""
+        """Whether the stations wander in each hypothesis (h,): a value constant within a lot may then be station wander."""
         return self.wander.gained > WALK_FROM
 
     @property
     def noise(self) -> tuple[Array, Array]:
-        """Standard deviations (h,) over the stated ones: of lots about their stations, of units inside lots; one at first."""
+        """Standard deviations (h,) over the stated ones, of lots about their stations and of units within lots; 1 at first."""
         stated = np.ones(self.count)
         both = (self._scales[name].rms if name in self._scales else stated for name in ("between", "inside"))
         return next(both), next(both)
 
     def shared_by_stations(self) -> Flags:
-        """Effects (h,) that stations share rather than differ in.
+        """Whether each mean (h,) is common to the stations, not due to permanent errors of their references.
 
-        The references of each station may have an error of their own for good. Stations about a common mean are compared with
-        stations about zero, at the same scatter: k/2·ln(1 + mean²/s²), where s is their scatter, or the noise if that is larger.
-        Three hundred to one on the axis are enough, or Student's t of the stations on all axes of a column (Fisher's sum).
+        Stations scattered about a common mean are compared with stations scattered about zero: log odds k/2·ln(1 + mean²/s²) for
+        k stations, where s is their scatter, or the noise if that is larger. Odds of three hundred to one on the axis suffice, or
+        Student's t of the stations over all axes of a column (Fisher's combination).
         """
         table, count = self.levels.get(STATION), len(self.wander.stations)
         if table is None or count < 2 or "between" not in self._scales:
@@ -155,7 +155,7 @@ class Evidence:
         return seen.all(axis=0) & ((odds > SHARED) | (on_axes & (p < _SHARED_ON_ONE)))
 
     def _begin(self) -> None:
-        """Scales from the medians of the first lots; then these lots as if they came now."""
+        """Initialise the scales from medians of the first lots, then add these lots in their order."""
         seen = np.array([lot.information > 0.0 for lot in self._held])
         info = np.array([np.where(lot.information > 0.0, lot.information, 1.0) for lot in self._held])
         z = np.where(seen, np.array([lot.score.sum(axis=0) for lot in self._held]) / np.sqrt(info), np.nan)
@@ -190,7 +190,7 @@ class Evidence:
         self._inside(lot)
         self.wander.update(lot.station, size, info, found, rms)
         between.add(between.bounded(found.value))
-        # one centre and one bound: a bad lot moves what the others are held against by no more than it may say
+        # the mean is updated with the bounded deviation, so that a bad lot has limited influence on it
         centre = self._centre()
         left = self._scales["between"].bounded(np.where(seen, (size - centre) * np.sqrt(safe), 0.0))
         self.score += np.where(seen, centre * safe + left * np.sqrt(safe), 0.0)
@@ -212,7 +212,7 @@ class Evidence:
         return self.score / np.maximum(self.information, 1e-300)
 
     def _stations(self, lot: ScoredLot, size: Array, safe: Array, seen: Flags) -> None:
-        """Stations that differ for good: each lot against what its station's earlier ones predict."""
+        """Add evidence of permanent differences between stations: each lot against its station's earlier lots."""
         table = self.levels.setdefault(STATION, Levels(self.count))
         prior, centre = SHRUNK * self._typical, self._centre()
         (of_station,), (behind,) = table.predicted((lot.station,), prior)
@@ -225,9 +225,9 @@ class Evidence:
         table.add((lot.station,), score[None], np.where(seen, safe, 0.0)[None])
 
     def _between(self, lot: ScoredLot, found: Innovation) -> None:
-        """Drivers whose value may be the same for a whole lot, against what the station's own past leaves.
+        """Add evidence of drivers that may be constant within a lot, by the innovations of the station's filter.
 
-        A level is predicted by the lots of other stations, where there are some: what wanders with one station is no news there.
+        A level is predicted by lots of other stations, if there are any, so that the wander of a station does not count.
         """
         scale, prior = self._scales["between"], SHRUNK * self._typical
         rms, by_unit, ratio = scale.rms, lot.own, lot.information / lot.total
@@ -248,16 +248,16 @@ class Evidence:
                 each_table.add(labels, score, by_unit * ratio)
         for name, numbers in {DATE: np.array([lot.day]), **lot.numbers}.items():
             known = numbers[np.isfinite(numbers)]
-            standing = self._standing(name, float(known.mean())) if known.size else None
-            if standing is None:
+            standardised = self._standardised(name, float(known.mean())) if known.size else None
+            if standardised is None:
                 continue
-            prediction = np.full(self.count, standing)
+            prediction = np.full(self.count, standardised)
             value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, found.known)
             weight = np.clip(left / np.sqrt(np.maximum(self._typical, 1e-300)), -BOUND, BOUND)
             self._sums(name, two_sided=True).add(scale.bounded(value) / rms * weight)
 
-    def _standing(self, name: str, value: float) -> float | None:
-        """A lot's value of a driver less the mean of earlier ones, over their standard deviation; None for the first ones."""
+    def _standardised(self, name: str, value: float) -> float | None:
+        """A lot's value of a driver less the mean of earlier ones, over their standard deviation; None for the first three."""
         n, mean, squares = self._numbers.get(name, (0.0, 0.0, 0.0))
         spread = np.sqrt(squares / n) if n else 0.0
         step = value - mean
@@ -265,7 +265,7 @@ class Evidence:
         return float(np.clip(step / spread, -BOUND, BOUND)) if n > 2.0 and spread > 0.0 else None
 
     def _inside(self, lot: ScoredLot) -> None:
-        """Drivers that differ between the units of a lot: what the lot has in common cancels."""
+        """Add evidence of drivers that differ between the units of a lot, by differences within it."""
         by_unit = lot.own
         free, information = lot.inside
         root = np.sqrt(information)
@@ -298,7 +298,7 @@ class Evidence:
                 self._units[unit] = score + sums[0], known + sums[1]
 
     def _slopes(self, lot: ScoredLot, left: Array) -> None:
-        """Numbers that differ by axis, too, and the sums that their slopes are estimated from."""
+        """Add evidence of numbers that also differ by axis, and the sums for the estimates of their slopes."""
         for name, numbers in lot.slopes.items():
             about = numbers - lot.averaged(numbers)
             if np.isfinite(about).all() and about.any():
@@ -308,6 +308,7 @@ class Evidence:
                 self.levels.setdefault(name + INSIDE, Levels(self.count)).add((SLOPE, ALL), sums, squares)
 
     def _add_inside(self, name: str, lot: ScoredLot, predicted: Array, left: Array, *, two_sided: bool) -> None:
+        """Add the agreement of scores ``left`` with predicted sizes, (units, h) each, to the sums of a driver."""
         about = predicted - lot.averaged(predicted)
         size = np.sqrt((lot.own * about**2).sum(axis=0))
         scale = self._scales["inside"]
@@ -316,6 +317,7 @@ class Evidence:
         self._sums(name, two_sided=two_sided).add(x if two_sided else x * np.minimum(size / rms, BOUND))
 
     def _of_units(self, units: tuple[str, ...]) -> Array:
+        """Sizes (units, h) of the units in their earlier lots; zero for a unit measured for the first time."""
         out = np.zeros((len(units), self.count))
         for row, unit in enumerate(units):
             before = self._units.get(unit) if self._earlier is None else self._earlier(unit, self._taken)
@@ -324,7 +326,7 @@ class Evidence:
         return out
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The state as named arrays: what :meth:`restored` takes."""
+        """The state as named arrays, for :meth:`restored`."""
         out: dict[str, NDArray[Any]] = {"score": self.score, "information": self.information}
         out["counts"] = np.array([self.lots, self._taken], dtype=np.float64)
         for name, sums in self.drivers.items():
@@ -347,7 +349,7 @@ class Evidence:
         earlier: Callable[[str, int], tuple[Array, Array] | None],
         columns: Places | None = None,
     ) -> "Evidence":
-        """The evidence of a state."""
+        """The evidence with the state of :meth:`arrays`."""
         new = cls(count, earlier, columns)
         new.score, new.information = arrays["score"].copy(), arrays["information"].copy()
         new.lots, new._taken = (int(value) for value in arrays["counts"])

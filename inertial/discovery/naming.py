@@ -1,8 +1,8 @@
-"""Which effect, and which driver, an alarm of an archive stands for: all lots at once, after the evidence has raised it.
+"""Identification of the effect and driver behind an alarm of an archive, from all lots together.
 
-Every driver's sums say for each effect by how much it lowers the misfit of all lots, D; with k coefficients its score is
-D − k(1 + ln(D/k)), as for a variance that is estimated. Effects within 15 of the best are one class. The best is taken out of all
-sums by the products of the columns, and what is left is looked at again: at last for any function of the pose.
+The sums of every driver give the reduction D of the chi-square of all lots by each effect; with k coefficients its score is
+D − k(1 + ln(D/k)), the price of coefficients with estimated variance. Effects within 15 of the best form a class. The best effect
+is subtracted from all sums by the products of the columns, and the remainder is searched again, finally for any function of pose.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,31 +21,31 @@ from inertial.discovery.pose_shape import SHAPE
 from inertial.discovery.station_wander import over
 
 _MOST = 6
-"""Largest number of names of one night."""
+"""Largest number of names of one evaluation."""
 
-_TURNS = 5  # of a fit of columns, and of levels, that share lots
+_TURNS = 5  # iterations of a fit of columns and levels that share lots
 
 _INEXACT = 0.02
-"""Part of a score that is not known: products of columns are means over lots, effects are at the middle of their range."""
+"""Relative uncertainty of a score: products of columns are means over lots, parameters are at the middle of their range."""
 
-_SEEN = 1e-3  # share of its information that a column keeps beside another one, below which the two are one column
+_SEEN = 1e-3  # share of a column's information that remains beside another, below which the two are collinear
 
 _OF_POSE = 0.5
-"""Part of a name's score that a function of the pose loses with it where the name is one: all of a static effect's, and next to
-nothing of an effect of temperature or time."""
+"""Share of a name's score by which the score of a function of pose falls with it, from which on the name is a function of pose:
+nearly one for a static effect, nearly zero for an effect of temperature or time."""
 
-_ALIKE = 0.8  # cosine from which on columns are taken for each other where one of them is known to a few per cent
+_ALIKE = 0.8  # cosine from which on the remainder of one column, known to a few per cent, may be taken for the other
 
 _REMAINDER = 0.03
-"""Part of a named effect's score that its column, taken at the middle of its parameters' range, can leave."""
+"""Share of a named effect's score that can remain, because its column is taken at the middle of its parameters' range."""
 
 
 @dataclass(frozen=True)
 class Name:
-    """An effect that an archive holds, with its driver.
+    """An effect found in an archive, with its driver.
 
-    effects, drivers : classes, best first · sizes : (levels, axes), rms in a dwell, g; errors : their standard errors
-    labels, weights : of the levels · score : of the best
+    effects, drivers : equivalent ids, best first · sizes, errors : (levels, axes), g, rms per dwell and standard errors
+    labels, weights : names of the levels, and their numbers of units · score : score of the best
     """
 
     effects: tuple[str, ...]
@@ -59,10 +59,10 @@ class Name:
 
 @dataclass(frozen=True)
 class Unnamed:
-    """A function of the pose that differs by a driver and that no named effect is.
+    """A dependence on pose that differs by a driver and that no named effect explains.
 
-    level : of the driver that departs most, "" where it has none · size : (axes, p), of the free functions, g
-    covariance : (axes, p, p) · score : of all levels
+    level : level of the driver with the largest dependence, "" if it has none · size : (axes, p), g, of the free functions
+    covariance : (axes, p, p), g², of the sizes · score : score over all levels
     """
 
     driver: str
@@ -77,9 +77,9 @@ class Pool:
 
     Parameters
     ----------
-    columns : (k,) effect and number of its column; hypotheses are axes × columns
-    size : (h,), rms in a dwell of a coefficient of one, g
-    lot : (h, h), correlations of the columns' information in sums of lots · inside : (m, k, k), the same inside a lot
+    columns : (k,), effect and index of its column; hypotheses are axes × columns
+    size : (h,), g, rms in a dwell of a coefficient of one
+    lot : (h, h), products of the columns for sums over a lot's units · inside : (axes, k, k), for differences within a lot
     """
 
     def __init__(self, columns: Sequence[tuple[str, int]], size: Array, lot: Array, inside: Array) -> None:
@@ -90,21 +90,23 @@ class Pool:
     def names(
         self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float
     ) -> tuple[list[Name], list[Unnamed]]:
-        """The names of what the lots hold, and what has none, the strongest first.
+        """The effects found in the lots, and unexplained dependences on pose, the strongest first.
 
         Parameters
         ----------
         alarms : pairs of driver and effect with an alarm
-        needed : score from which on something is named
+        needed : smallest score of an effect that is named
         """
         alarmed = {(name.removesuffix(INSIDE), effect) for name, effect in alarms}
         drivers = list(dict.fromkeys(name for name, _ in sorted(alarmed)))
         found, every = list[Name](), lots
-        of_pose: list[dict[str, float]] = []  # before each name, and after the last
+        of_pose: list[
+            dict[str, float]
+        ] = []  # score of any function of pose by driver, before each name and after the last
         while True:
             sums = gathered(lots, drivers)
             scores = {name: self.scores(name, of) for name, of in sums.items()}
-            again = self._again(lots, list(sums))
+            significance = self._cross_validated(lots, list(sums))
             of_pose.append({name: of.get(SHAPE, 0.0) for name, of in scores.items()})
             pairs = [
                 (score, name, effect)
@@ -112,44 +114,46 @@ class Pool:
                 for effect, score in of.items()
                 if effect != SHAPE
                 and score > needed
-                and again[name][effect] > np.sqrt(2.0 * needed)
-                # what other names leave over is named only where it had an alarm itself, and stands out
+                and significance[name][effect] > np.sqrt(2.0 * needed)
+                # a remainder of other names is named only if it had an alarm itself and a clearly higher score
                 and (not found or ((name, effect) in alarmed and score > needed + CLASS_WIDTH))
             ]
-            name = next((named for named in self._in_order(pairs, sums, scores) if not self._told(found, named)), None)
+            name = next(
+                (named for named in self._in_order(pairs, sums, scores) if not self._already_named(found, named)), None
+            )
             if name is None or len(found) == _MOST:
                 break
             found.append(name)
-            lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
+            lots = self._subtracted(lots, name.drivers[0], name.effects[0])
         imitations = _imitations(found, of_pose, needed)
         genuine = [name for at, name in enumerate(found) if at not in imitations]
         if len(genuine) < len(found):
             lots = every
             for name in genuine:
-                lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
+                lots = self._subtracted(lots, name.drivers[0], name.effects[0])
         return genuine, self._unnamed(lots, genuine, drivers, needed)
 
     def _unnamed(
         self, lots: Sequence[ScoredLot], names: Sequence[Name], drivers: Sequence[str], needed: float
     ) -> list[Unnamed]:
-        """Functions of the pose that differ by a driver in lots without what is named."""
+        """Dependences on pose that differ by a driver, in lots from which the named effects are subtracted."""
         out: list[Unnamed] = []
         least = max([needed, *(_REMAINDER * name.score for name in names)])
         while SHAPE in self.effects and len(out) < _MOST:
             sums = gathered(lots, drivers)
-            again = self._again(lots, list(sums))
+            significance = self._cross_validated(lots, list(sums))
             scores = {driver: self.scores(driver, of)[SHAPE] for driver, of in sums.items()}
-            left = [driver for driver in scores if again[driver][SHAPE] > np.sqrt(2.0 * needed)]
+            left = [driver for driver in scores if significance[driver][SHAPE] > np.sqrt(2.0 * needed)]
             best = max(left, key=lambda driver: scores[driver], default=None)
             if best is None or scores[best] <= least or best in {unnamed.driver for unnamed in out}:
                 break
             out.append(self._shape(best, sums[best], scores[best]))
             least = max(least, _REMAINDER * scores[best])
-            lots = self._fitted_out(lots, best, SHAPE)
+            lots = self._subtracted(lots, best, SHAPE)
         return out
 
     def _shape(self, driver: str, sums: DriverSums, score: float) -> Unnamed:
-        """The function of the pose of the level that departs most."""
+        """The dependence on pose of the level with the largest one."""
         size, products = self._fitted(driver, SHAPE, sums)
         z = size / np.sqrt(np.maximum(np.diagonal(products, axis1=2, axis2=3), 1e-300))
         level = int(np.argmax(np.sum(z**2, axis=(0, 2))))
@@ -157,7 +161,7 @@ class Pool:
         return Unnamed(driver, label, size[:, level], products[:, level], score)
 
     def _fitted(self, driver: str, effect: str, sums: DriverSums) -> tuple[Array, Array]:
-        """Sizes (axes, levels, p) of a driver's levels, the columns of an effect together, and their covariances."""
+        """Sizes (axes, levels, p) of an effect's columns, fitted jointly per level, and covariances (axes, levels, p, p)."""
         here, centred = self._everywhere(effect), about_common(driver, sums)
         inner = self._inner(sums, effect)
         root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
@@ -177,13 +181,13 @@ class Pool:
     ) -> Iterator[Name]:
         """Pairs of score, driver and effect as names, the best first."""
         for top, best, effect in sorted(pairs, reverse=True):
-            # what differs by a level is not zero on average either: the driver says more
+            # an effect that differs by level has a nonzero mean, too: such a driver is preferred to the mean
             same = (n for score, n, other in pairs if other == effect and n != MEAN and score > top - CLASS_WIDTH)
             driver = next(same, best)
             yield self._name(driver, sums[driver], effect, scores)
 
-    def _told(self, found: Sequence[Name], new: Name) -> bool:
-        """Whether an effect is named with this driver, or is what is left of one whose column is known to a few per cent."""
+    def _already_named(self, found: Sequence[Name], new: Name) -> bool:
+        """Whether a name repeats an earlier one, or is the remainder of one whose column is known to a few per cent."""
         effect, driver = new.effects[0], new.drivers[0]
         for name in found:
             little = new.score < _REMAINDER * name.score
@@ -193,8 +197,8 @@ class Pool:
                 return True
         return False
 
-    def _fitted_out(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
-        """The lots without an effect of a driver: columns of the effect, and levels that share lots, are fitted in turns."""
+    def _subtracted(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
+        """The lots with an effect of a driver subtracted, iterated because its columns and levels share lots."""
         for _ in range(_TURNS):
             sums = gathered(lots, [driver])
             if driver not in sums or self.scores(driver, sums[driver])[effect] < 1.0:
@@ -204,17 +208,17 @@ class Pool:
         return lots
 
     def _sizes(self, driver: str, effect: str, sums: DriverSums) -> Array:
-        """Sizes (axes, levels, p) of a driver's levels, drawn to zero by what is noise of them."""
+        """Sizes (axes, levels, p) of a driver's levels, shrunk towards zero according to their noise."""
         size, covariance = self._fitted(driver, effect, sums)
         if len(sums.labels) > 1:
             known = np.diagonal(covariance, axis1=2, axis2=3)
             size = np.stack([of * shrinkage(of, over(np.ones_like(c), c)) for of, c in zip(size, known, strict=True)])
         return size
 
-    def _again(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, dict[str, float]]:
-        """By how many standard deviations one half of the lots predicts the other, for every driver and effect.
+    def _cross_validated(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, dict[str, float]]:
+        """Significance, in standard deviations, with which halves of the lots predict each other, by driver and effect.
 
-        It is scaled by itself, lot by lot: an effect whose noise is larger than stated, as of slow ones, is not named for it.
+        It is normalised by the contributions of the lots themselves, so that noise larger than stated does not raise it.
         """
         total = {name: np.zeros((2, len(self.effects))) for name in drivers}
         for name, x in self._crossed(lots, drivers):
@@ -225,23 +229,23 @@ class Pool:
         }
 
     def _crossed(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> Iterator[tuple[str, Array]]:
-        """For each lot and driver, what the lot shows times what the other half of the lots predicts of it, (effects,)."""
+        """For each lot and driver, the product of the lot's scores and their prediction by the other half, (effects,)."""
         halves = gathered(lots[0::2], drivers), gathered(lots[1::2], drivers)
         for number, lot in enumerate(lots):
             for name, sums in halves[1 - number % 2].items():
                 yield name, self._of_effects(self._predicted(lot, name, sums))
 
     def carried(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Array:
-        """Contribution (n,) of each lot to the evidence of an effect by a driver."""
+        """Contribution (n,) of each lot to the cross-validated evidence of an effect by a driver."""
         index = self.effects.index(effect)
         return np.array([x[index] for _, x in self._crossed(lots, [driver])])
 
     def confirmed(
         self, before: Sequence[ScoredLot], after: Sequence[ScoredLot], driver: str, effect: str
     ) -> tuple[float, float, int]:
-        """How much of what earlier lots predict later ones show, with its standard error, and the lots that can show it.
+        """Part of an effect predicted by earlier lots that later ones reproduce, its standard error, the number of lots used.
 
-        It is one where the effect is confirmed; lots with levels that were not there before show nothing.
+        The part is one if the effect is confirmed; lots with new levels of the driver are not used.
         """
         index, sums = self.effects.index(effect), gathered(before, [driver])
         if driver not in sums:
@@ -257,7 +261,7 @@ class Pool:
         return factor, float(np.sqrt(np.sum((shown - factor * expected) ** 2))) / total, able
 
     def _expected(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
-        """What :meth:`_predicted` is on average if the prediction holds, (h,)."""
+        """Expected value of :meth:`_predicted` if the prediction is true, (h,)."""
         of_units = _of_units(lot, driver, sums)
         common = lot.averaged(of_units)
         inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
@@ -270,7 +274,7 @@ class Pool:
 
     @cached_property
     def _sum_over(self) -> Array:
-        """(h, effects): which axes and columns belong to an effect."""
+        """Indicator (h, effects), 1 where a hypothesis belongs to an effect."""
         belongs = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
         return np.tile(belongs, (self.axes, 1))
 
@@ -278,12 +282,12 @@ class Pool:
         return x @ self._sum_over
 
     def _predicted(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
-        """Product (h,) of what a lot shows and what other lots predict of it."""
+        """Product (h,) of a lot's scores and the sizes that other lots predict, summed over its units."""
         of_units = _of_units(lot, driver, sums)
         return ((lot.inside[0] if driver in INSIDE_ONLY else lot.score) * of_units).sum(axis=0)
 
     def without(self, lot: ScoredLot, driver: str, effect: str, sums: DriverSums, sizes: Array) -> ScoredLot:
-        """A lot without sizes (axes, levels, p) of an effect: algebra on its sums, no dwell is read again."""
+        """A lot with an effect of sizes (axes, levels, p) subtracted from its sums; no dwell is read again."""
         at, count, units = self.places(effect), len(self.columns), len(lot.units)
         weights = weights_of(lot, driver, sums)
         if not weights.any():
@@ -298,36 +302,36 @@ class Pool:
             total = np.maximum(lot.own[:, here].sum(axis=0), 1e-300)
             in_common.append((of_units * lot.own[:, here]).sum(axis=0) / total)
             score[:, every] -= unit_roots * (((of_units - in_common[-1]) * unit_roots[:, at]) @ self.inside[axis][at])
-        # errors of the station, which are free, join the axes
+        # the free errors of the station couple the axes
         score -= root * ((np.concatenate(in_common) * root[everywhere]) @ self.lot[everywhere]) / units
         return replace(lot, score=score)
 
     def with_effect(self, lot: ScoredLot, effect: str) -> ScoredLot:
-        """A lot whose model has an effect more, with coefficients of every unit and axis: U_j − I_jk U_k / I_kk, on its sums."""
+        """A lot with an effect added to its model, with coefficients of every unit and axis: U_j − I_jk U_k / I_kk."""
         at, count = self.places(effect), len(self.columns)
         sums, share = lot.score.sum(axis=0), lot.own / lot.total
         left, by_unit, information = lot.inside[0].copy(), lot.own.copy(), lot.information.copy()
         for axis in range(self.axes):
             every = axis * count + np.arange(count)
-            left[:, every], by_unit[:, every] = _beside(left[:, every], by_unit[:, every], self.inside[axis], at)
-        of_sums = _beside(sums[None], information[None], self.lot, self._everywhere(effect))
+            left[:, every], by_unit[:, every] = _eliminated(left[:, every], by_unit[:, every], self.inside[axis], at)
+        of_sums = _eliminated(sums[None], information[None], self.lot, self._everywhere(effect))
         sums, information = (part[0] for part in of_sums)
         score = np.where(by_unit > 0.0, left + share * sums, 0.0)
         return replace(lot, score=score, own=by_unit, information=information)
 
     def places(self, effect: str) -> Places:
-        """Columns of an effect, (p,)."""
+        """Indices of the columns of an effect, (p,)."""
         return np.array([k for k, (name, _) in enumerate(self.columns) if name == effect], dtype=np.intp)
 
     def _everywhere(self, effect: str) -> Places:
-        """Hypotheses of an effect, (axes·p,), axis by axis."""
+        """Indices of the hypotheses of an effect, (axes·p,), axis by axis."""
         return (np.arange(self.axes)[:, None] * len(self.columns) + self.places(effect)).reshape(-1)
 
     def _inner(self, sums: DriverSums, effect: str) -> Array:
-        """Inverse of the correlations of an effect's hypotheses, (axes·p, axes·p), for a driver.
+        """Pseudo-inverse of the correlations of an effect's hypotheses, (axes·p, axes·p), for a driver.
 
-        Combinations that errors of the station, or rounding of the stored sums, leave nothing of do not count: of a large effect
-        they would explain three times what there is.
+        Combinations that vanish beside errors of the station, or by rounding of the stored sums, are excluded: otherwise a large
+        effect would seem to explain three times the actual chi-square.
         """
         at, here = self.places(effect), self._everywhere(effect)
         if sums.mixed:
@@ -346,14 +350,14 @@ class Pool:
         return out
 
     def _drop(self, name: str, sums: DriverSums, effect: str) -> tuple[float, Array]:
-        """Fall of the misfit by an effect's columns, and the number of coefficients of each hypothesis."""
+        """Reduction of chi-square by an effect's columns, and the number of coefficients of each hypothesis."""
         here = self._everywhere(effect)
         info = sums.information[:, here]
         z = over(about_common(name, sums)[:, here], np.sqrt(np.maximum(info, 0.0)))
         return float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
 
     def _rank(self, effect: str, behind: float, top: float) -> tuple[bool, int, int, float]:
-        """Order in a class: of those that inexact columns do not tell apart the simplest is first."""
+        """Sort key in a class: among effects that inexact columns do not distinguish, the simplest is first."""
         simplicity = effects_catalogue.get(effect).simplicity
         return behind > _INEXACT * top, len(self.places(effect)), simplicity, behind
 
@@ -375,11 +379,11 @@ class Pool:
 
 
 def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], needed: float) -> set[int]:
-    """Names that are parts of a function of the pose which no effect is: together they explain less than it does alone.
+    """Indices of names that are parts of a function of pose outside the catalogue: together they explain less than it does.
 
     Parameters
     ----------
-    of_pose : for each name, and after the last, score of such a function by each driver
+    of_pose : score of any function of pose by driver, before each name and after the last
     """
     out: set[int] = set()
     for driver in {name.drivers[0] for name in names}:
@@ -392,8 +396,8 @@ def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], n
     return out
 
 
-def _beside(values: Array, information: Array, products: Array, at: Places) -> tuple[Array, Array]:
-    """Scores and information (n, h) beside the columns ``at``, whose coefficients are free, by correlations (h, h)."""
+def _eliminated(values: Array, information: Array, products: Array, at: Places) -> tuple[Array, Array]:
+    """Scores and information (n, h) after elimination of the columns ``at``, by correlations (h, h)."""
     inner = np.linalg.pinv(products[np.ix_(at, at)], rcond=1e-6, hermitian=True)
     root = np.sqrt(np.maximum(information, 0.0))
     values = values - root * (over(values, root)[:, at] @ inner @ products[at])
@@ -409,6 +413,6 @@ def _of_units(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
 
 
 def _correlation(products: Array) -> Array:
-    """Products (..., k, k) over the roots of their diagonals; zero where nothing is seen."""
+    """Products (..., k, k) normalised to a unit diagonal; zero where the diagonal is zero."""
     root = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 0.0))
     return over(products, root[..., :, None] * root[..., None, :])

@@ -1,8 +1,8 @@
-"""Two populations in a coefficient of many units, against one population of any usual form.
+"""Test of a coefficient of many units for two populations, against a single unimodal one (split likelihood ratio).
 
-One half of the units fits a mixture of two normal laws; the other half compares it with the best one-peaked law fitted to itself
-(Student's t, a sinh-arcsinh law, or one with a flat top). The ratio of the likelihoods, averaged over both ways, is evidence: its
-mean is one at most where there is one population (Wasserman, Ramdas, Balakrishnan 2020; Jones and Pewsey 2009).
+A mixture of two normal distributions is fitted to one half of the units; on the other half it is compared with the best unimodal
+distribution fitted to that half (Student's t, sinh-arcsinh or generalised normal). The likelihood ratio, averaged over both ways,
+is evidence: under one population its mean is at most one (Wasserman, Ramdas, Balakrishnan 2020; Jones and Pewsey 2009).
 """
 
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from scipy import optimize, special
 from inertial.arrays import Array
 
 FEWEST = 200
-"""Units from which on two populations are looked for."""
+"""Smallest number of units for the test."""
 
 MOST = 4000
-"""Units that are used, drawn at random from more."""
+"""Largest number of units that are used, drawn at random from more."""
 
-_STARTS = (0.02, 0.1, 0.5, 0.9, 0.98)  # shares of the lower population at which the mixture begins
+_STARTS = (0.02, 0.1, 0.5, 0.9, 0.98)  # starting values of the share of the lower population
 _STEPS = 300
-_LEAST = -2.5  # of the logarithm of a law's width over the quartiles'
-_NARROW = 0.05  # smallest width of a population over that of all
+_LEAST = -2.5  # lower bound of the logarithm of a distribution's width over that by the quartiles
+_NARROW = 0.05  # smallest width of a population over that of all units
 
 
 @dataclass(frozen=True)
 class TwoPopulations:
-    """Evidence, and the mixture of all units: means, standard deviations, share of the smaller one."""
+    """Log evidence, and the mixture fitted to all units: means, standard deviations, share of the smaller population (first)."""
 
     log_e: float
     means: tuple[float, float]
@@ -36,7 +36,7 @@ class TwoPopulations:
 
 
 def two_populations(values: Array, rng: Generator) -> TwoPopulations | None:
-    """The evidence for two populations; None where there are too few values, or all are alike.
+    """The evidence for two populations; None if there are too few values or no scatter.
 
     Parameters
     ----------
@@ -69,13 +69,13 @@ def two_populations(values: Array, rng: Generator) -> TwoPopulations | None:
 
 
 def _parts(z: Array, weights: Array, means: Array, widths: Array) -> Array:
-    """Log likelihoods (2, n) of values under the two laws of a mixture."""
+    """Log likelihoods (2, n) of values under the two weighted components of a mixture."""
     about = (z - means[:, None]) / widths[:, None]
     return np.log(weights / widths)[:, None] - 0.5 * about**2 - 0.5 * np.log(2.0 * np.pi)
 
 
 def _fitted(z: Array) -> tuple[Array, Array, Array]:
-    """Weights, means and widths of two normal laws by expectation and maximisation, the best of several beginnings."""
+    """Weights, means and widths, (2,) each, of a normal mixture by expectation-maximisation, best of several starts."""
     best: tuple[float, tuple[Array, Array, Array]] | None = None
     least = _NARROW * float(z.std())
     for share in _STARTS:
@@ -90,7 +90,7 @@ def _fitted(z: Array) -> tuple[Array, Array, Array]:
             shares = np.exp(parts - total)
             counts = np.maximum(shares.sum(axis=1), 2.0)
             weights, means = counts / counts.sum(), shares @ z / counts
-            # a floor that is added would widen both at each step
+            # a lower bound, because a constant added to the widths would widen both at each step
             widths = np.maximum(np.sqrt((shares * (z - means[:, None]) ** 2).sum(axis=1) / counts), least)
             now = float(np.sum(total))
             if now - before < 1e-4:
@@ -104,7 +104,7 @@ def _fitted(z: Array) -> tuple[Array, Array, Array]:
 
 
 def _one_peak(z: Array) -> float:
-    """Largest log likelihood of values under one law: Student's t, sinh-arcsinh, generalised normal."""
+    """Largest log likelihood of values under one unimodal distribution: Student's t, sinh-arcsinh, generalised normal."""
 
     def student(theta: Array) -> float:
         scale = float(np.clip(theta[1], _LEAST, 5.0))
@@ -114,7 +114,7 @@ def _one_peak(z: Array) -> float:
         return -float(constant * z.size - 0.5 * (nu + 1.0) * np.log1p(about**2 / nu).sum())
 
     def sinh_arcsinh(theta: Array) -> float:
-        # a narrow law with wide tails has a peak of any height at a single value
+        # width and tails are bounded: a narrow distribution with wide tails could have any density at a single value
         scale = float(np.clip(theta[1], _LEAST, 5.0))
         width, tails = np.exp(scale), np.exp(np.clip(theta[3], -1.5, 3.0))
         about = (z - theta[0]) / width

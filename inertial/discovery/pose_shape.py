@@ -1,6 +1,6 @@
-"""Free functions of the pose, for what no effect of the catalogue is like: real spherical harmonics of the force's direction.
+"""Free functions of pose, for dependences outside the catalogue: real spherical harmonics of the direction of the force.
 
-Degrees 0 and 1 are bias, scale and misalignment; degrees 2 to 4 are what a static error of the transfer or of a pose can add.
+Degrees 0 and 1 are bias, scale and misalignment; degrees 2 to 4 represent static errors of the transfer function or of a pose.
 """
 
 import numpy as np
@@ -9,17 +9,14 @@ from scipy.special import factorial, lpmv
 from inertial.arrays import Array
 
 SHAPE = "any function of the pose"
-"""Name of these columns in place of an effect's."""
+"""Name of these columns in place of an effect id."""
 
 _DEGREES = (2, 3, 4)
 COUNT = sum(2 * degree + 1 for degree in _DEGREES)
 
 
 def harmonics(force: Array) -> Array:
-    """Values (..., 21) at the directions of forces (..., 3): orthogonal over the sphere, each of rms one.
-
-    A force of zero has no direction: all are zero there.
-    """
+    """Values (..., 21) at the directions of forces (..., 3): orthogonal over the sphere, each of rms one; zero for zero force."""
     size = np.linalg.norm(force, axis=-1)
     x, y, z = np.moveaxis(force / np.where(size > 0.0, size, 1.0)[..., None], -1, 0)
     around = np.arctan2(y, x)
@@ -39,7 +36,7 @@ def angles_of(force: Array) -> Array:
 
 
 def map_of(force: Array, size: Array, covariance: Array) -> tuple[Array, Array]:
-    """A free function at poses, less what a linear model of the axis takes of it, and its standard errors, (n,) each.
+    """A free function at poses after a fit of bias and linear response, and its standard errors, (n,) each, unit of ``size``.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""What earlier lots say, as running sums: the evidence of a driver, sizes of its levels, the scale of what comes.
+"""Running sums over the lots so far: the evidence of a driver, the sizes of its levels, the scale of the increments.
 
-Each increment x is symmetric about zero where there is nothing, given all earlier lots. Then exp(λS − λ²V/2) with S = Σx and
+Each increment x is, given all earlier lots, symmetric about zero under the null hypothesis. Then exp(λS − λ²V/2) with S = Σx and
 V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004).
 """
 
@@ -13,10 +13,10 @@ from inertial.arrays import Array, Places
 from inertial.discovery.station_wander import over
 
 FIRST = 30
-"""Lots that are held back: their medians bound what one of them can do. One lot multiplies evidence by 1.65 at most."""
+"""Number of lots held back until their medians limit the influence of each: a lot multiplies evidence by 1.65 at most."""
 
 BOUND = 5.0
-"""Largest number of standard deviations that a lot counts for."""
+"""Limit, in standard deviations, to which the value of a lot is clipped."""
 
 _MIXED = np.array([0.3, 0.03, 0.003])
 _RATES: Array = np.exp2(np.arange(1.0, -15.0, -1.0))
@@ -24,9 +24,9 @@ _RATES: Array = np.exp2(np.arange(1.0, -15.0, -1.0))
 
 @dataclass
 class Sums:
-    """Evidence of one driver for every hypothesis, then for every effect as a whole: Σx, Σx².
+    """Sums Σx, Σx² of one driver for every hypothesis, then for every effect with all its columns.
 
-    effects : (h,), number of the effect of each hypothesis; None where none stands for several
+    effects : (h,), index of the effect of each hypothesis; None without sums for complete effects
     """
 
     s: Array
@@ -43,7 +43,7 @@ class Sums:
     def add(self, x: Array) -> None:
         """Add the increments (h,) of a lot."""
         if self.effects is not None:
-            # of two signs: times what earlier lots predict
+            # increments of either sign are multiplied by the prediction of earlier lots
             signed = x * self.s[: x.size] / (self.v[: x.size] + FIRST) if self.two_sided else x
             wholes = np.bincount(self.effects, signed, self.s.size - x.size)
             x = np.concatenate([x, np.asarray(wholes, dtype=np.float64)])
@@ -64,18 +64,18 @@ class Sums:
 
 
 class Levels:
-    """What earlier lots say of every level of a driver: sums of scores and of information, (levels, h)."""
+    """Sums over earlier lots of the scores and of the information of every level of a driver, (levels, h) each."""
 
     def __init__(self, count: int) -> None:
         self.place: dict[str, int] = {}
         self.score, self.information = np.zeros((0, count)), np.zeros((0, count))
 
     def predicted(self, labels: tuple[str, ...], prior: Array, without: "Levels | None" = None) -> tuple[Array, Array]:
-        """Predicted sizes (units, h), drawn towards zero by a prior information (h,), and the information behind them.
+        """Predicted sizes (units, h), shrunk towards zero by a prior information (h,), and their information (units, h).
 
         Parameters
         ----------
-        without : a part of the lots that is left out
+        without : sums of lots that are excluded from the prediction
         """
         sizes, behind = np.zeros((2, len(labels), self.score.shape[1]))
         for unit, label in enumerate(labels):
@@ -103,7 +103,7 @@ class Levels:
 
 
 class Scale:
-    """Root mean square of what came before, bounded at each step; a median of the first lots begins it."""
+    """Root mean square of the earlier values, each clipped; it starts from a median of the first lots."""
 
     def __init__(self, start: Array) -> None:
         self.squares, self.n = 10.0 * start**2, np.full(start.size, 10.0)
@@ -114,11 +114,11 @@ class Scale:
         return np.sqrt(self.squares / self.n)
 
     def bounded(self, value: Array) -> Array:
-        """A value (h,) that counts for five standard deviations at most."""
+        """A value (h,) clipped to five standard deviations."""
         limit = BOUND * self.rms
         return np.clip(value, -limit, limit)
 
     def add(self, value: Array) -> None:
-        """Add a bounded value (h,); zeros are not counted."""
+        """Add a clipped value (h,); zeros are not counted."""
         self.squares += value**2
         self.n += value != 0.0

@@ -1,9 +1,9 @@
-"""What one lot leaves for an archive: scores and information of every effect that its model does not hold.
+"""Score statistics that a lot contributes to an archive: score and information of every effect outside its model.
 
 With V the covariance of the noise, H the columns of the model and P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹, a column x of a unit and
 axis has the score U = xᵀPy and the information I = xᵀPx: U/I estimates its coefficient, with variance 1/I. Both add over units
-and lots. Errors of the station of that day are free: their coefficients are estimated from the lot and taken out of the scores
-(score statistics of meta-analysis; elimination of local parameters as in the alignment of detectors).
+and lots. The errors of the station on that day are nuisance parameters: their coefficients are estimated from the lot and
+eliminated from the scores (as score statistics in meta-analysis, and local parameters in the alignment of detectors).
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,10 +27,10 @@ from inertial.estimation.refinement import terms_of
 from inertial.estimation.term import with_turn_on
 
 LEAST_LEFT = 0.05
-"""Share of its information that an effect keeps beside free errors of the station; below it, no lot can tell it from them."""
+"""Smallest share of an effect's information left after elimination of station errors; below it no lot can separate the two."""
 
 TEMPCO = "bias_temperature"
-"""The effect whose coefficient an error of the thermometer is multiplied by."""
+"""The effect whose coefficient multiplies an error of the thermometer."""
 
 _RIDGE = 1e-9
 
@@ -39,14 +39,14 @@ _RIDGE = 1e-9
 class LotScores:
     """Scores of a lot; coefficients in g per unit of the effect's column.
 
-    columns : (k,) effect and number of its column, of the sensor; station : (q,), of the station
-    axes : indices of the letters of the m axes
-    score : (units, m, k), errors of the station taken out · own : (units, m, k), information before that
-    lot : (m·k, m·k), information of the sums over the units, errors of the station taken out: they join the axes
-    inside : (m, k, k), mean information of a unit before that
-    station_score, station_information : (q,), of the columns of the station, each alone
-    tempco : (units, m), temperature coefficients of the biases that the model has, g/K; nan without
-    floor : rms of the noise of a dwell, g · size : (m, k), rms over the dwells that a coefficient of one leaves of its column, g
+    columns : (k,), effect and index of its column, of the sensor; station : (q,), the same of the station
+    axes : indices of the m measured axes
+    score : (units, m, k), errors of the station eliminated · own : (units, m, k), information before the elimination
+    lot : (m·k, m·k), information of the sums over the units after the elimination, which couples the axes
+    inside : (m, k, k), mean information of a unit before the elimination
+    station_score, station_information : (q,), of each column of the station alone
+    tempco : (units, m), g/K, temperature coefficients of the biases in the model; nan without
+    floor : g, rms of the noise of a dwell · size : (m, k), g, rms over the dwells of a column beyond the model, coefficient one
     """
 
     columns: tuple[tuple[str, int], ...]
@@ -66,14 +66,14 @@ class LotScores:
 def scores_of(
     lot: Lot, effects: Sequence[str], tried: Iterable[AnyEffect] | None = None, shares: Shares | None = None
 ) -> LotScores:
-    """Scores of the effects that a model lacks.
+    """Scores of the effects outside a model.
 
     Parameters
     ----------
-    lot : dwells in g, of units without a fault of the data
+    lot : dwells in g, of units without data faults
     effects : ids of the model
-    tried : effects to score; all of the catalogue, and free functions of the pose, by default
-    shares : of the noise of this model, where they are known; else they are estimated, which takes a third of the time
+    tried : effects to score; by default all of the catalogue, and free functions of pose
+    shares : shares of 1/f and random walk in the noise, where known; estimating them takes a third of the time
 
     Raises
     ------
@@ -97,7 +97,7 @@ def scores_of(
 
 
 def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[list[Array], list[tuple[str, int]]]:
-    """Columns, (blocks, n, p) each, of effects at the middle of their grids, and names; without those that lack a quantity."""
+    """Columns, (blocks, n, p) each, of effects at the middle of their grids, and their names; without unrecorded quantities."""
     made: list[Array] = []
     names: list[tuple[str, int]] = []
     for effect in effects:
@@ -118,7 +118,7 @@ def _scored(
     names: tuple[tuple[str, int], ...],
     station: tuple[tuple[str, int], ...],
 ) -> LotScores:
-    """Scores from one pass of all columns, those of the sensor before those of the station, through the whitened space."""
+    """Scores of all columns, those of the sensor before those of the station, whitened in one pass."""
     problem, space, even, covariance = model.problem, model.space, model.even, model.problem.covariance
     k, m, every = len(names), problem.per_unit, slice(0, problem.blocks)
     units = problem.blocks // m
@@ -126,7 +126,7 @@ def _scored(
     for part in columns:
         rows[:, at : at + part.shape[-1]] = np.swapaxes(part, -1, -2)
         at += part.shape[-1]
-    # every dwell with the same weight: what wander takes from the information of a column, it does not take from the output
+    # with equal weights: wander reduces the information of a column, but not its size in the output
     plain = covariance.white_rows(rows[:, :k].copy(), even.noise.shares, every)
     squares = np.einsum("bkn,bkn->bk", plain, plain) - np.sum((plain @ even.q) ** 2, axis=-1)
     plain = squares / (covariance.level * even.noise.scale)[:, None] ** 2
@@ -148,14 +148,14 @@ def _scored(
     lots = np.stack([np.tensordot(of_sensor[a::m], of_sensor[a::m], ((0, 2), (0, 2))) for a in range(m)])
     joined = summed.reshape(m * k, -1)
     less = block_diag(*lots) - joined @ inverse @ joined.T
-    told = np.diagonal(less).reshape(m, k) > LEAST_LEFT * np.diagonal(lots, axis1=1, axis2=2)
-    less = less * np.outer(told, told)
+    separable = np.diagonal(less).reshape(m, k) > LEAST_LEFT * np.diagonal(lots, axis1=1, axis2=2)
+    less = less * np.outer(separable, separable)
     rms = np.sqrt(np.maximum(plain, 0.0) * visible[:, :k] * covariance.white / problem.n)
     return LotScores(
         columns=names,
         station=station,
         axes=tuple(problem.axes),
-        score=free.reshape(units, m, k) * told,
+        score=free.reshape(units, m, k) * separable,
         own=information.reshape(units, m, k),
         lot=less,
         inside=lots / units,
@@ -179,7 +179,7 @@ def _tempco(model: Model) -> Array:
 
 
 def _inverse(information: Array) -> Array:
-    """Pseudo-inverse of the station's information, in units of its diagonal: columns of a station may be the same."""
+    """Pseudo-inverse of the station's information (q, q), scaled to a unit diagonal: columns of a station may be collinear."""
     scale = np.sqrt(np.maximum(np.diagonal(information), 1e-300))
     inner = np.linalg.pinv(information / np.outer(scale, scale), rcond=_RIDGE, hermitian=True)
     return np.where(np.outer(scale, scale) > 1e-290, inner / np.outer(scale, scale), 0.0)

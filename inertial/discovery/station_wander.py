@@ -1,9 +1,9 @@
-"""What the past of a station predicts of its next lot: a level that may wander, for every effect.
+"""Prediction of a station's next lot from its earlier ones: a local level that may wander, for every effect.
 
-A reference that wanders slowly in a way that no column of the station holds looks like whatever changes slowly beside it: a
-wafer, a batch, a firmware. Each station therefore has a local level (random walk and noise, Kalman filter); the ratio of the walk
-to the noise is chosen by the likelihood of the past. Innovations are judged, against what the filter leaves of a driver's own
-prediction.
+A slowly drifting reference that no column of the station describes is confounded with everything that changes slowly: a wafer, a
+batch, a firmware. Each station therefore has a local-level model (random walk plus noise, Kalman filter), whose ratio of walk to
+noise is chosen by the likelihood of the past. Drivers are judged by the innovations, against the prediction of the driver
+passed through the same filter.
 """
 
 from collections.abc import Mapping
@@ -17,15 +17,15 @@ WALKS: Array = np.array([0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.
 """Variance of the walk from one lot of a station to the next, over that of the noise of a lot."""
 
 WALK_FROM = 2.0
-"""Gain of the log likelihood from which on a station has a walk: its filter is used, and what is constant in a lot may be it."""
+"""Gain of log likelihood from which on stations have a random walk; a value constant within a lot may then be station wander."""
 
 _LARGEST = 5.0
-_BETWEEN = "\x1f"  # between the names of a driver and of a station, which may hold anything that is printed
+_BETWEEN = "\x1f"  # separator of the names of a driver and of a station, which may contain any printable character
 
 
 @dataclass
 class Level:
-    """State of a station for each walk and effect, (q, h): level, its variance over that of the noise, whether it is known."""
+    """Filter state of a station for each walk and effect: level and its variance, (q, h), whether it is known, (h,)."""
 
     mean: Array
     variance: Array
@@ -35,11 +35,11 @@ class Level:
 
 @dataclass(frozen=True)
 class Innovation:
-    """What a lot adds to the past of its station, at the walk that the past prefers.
+    """Innovation of a lot: its deviation from the prediction by its station's past, over the standard deviation.
 
-    value : (h,), of unit variance where the noise is as stated; zero where nothing is known
-    every : (q, h), the same at each walk · gain, roots : (q, h), of the filter, and standard deviations of the innovations
-    known : (h,), whether the station has a past
+    value : (h,), at the walk that the past prefers, of unit variance if the noise is as stated; zero if there is no past
+    every : (q, h), the same at each walk · gain, roots : (q, h), filter gains, and standard deviations of the innovations
+    known : (h,), whether the station has earlier lots
     """
 
     value: Array
@@ -50,41 +50,41 @@ class Innovation:
 
 
 class Wander:
-    """Filters of all stations.
+    """Kalman filters of all stations.
 
     Parameters
     ----------
-    count : number of effects, h
+    count : number of hypotheses, h
     """
 
     def __init__(self, count: int) -> None:
         self.stations: dict[str, Level] = {}
         self.log_likelihood: Array = np.zeros((WALKS.size, count))
-        self.beside: dict[str, Array] = {}  # the likelihood with a driver's prediction in it
+        self.beside: dict[str, Array] = {}  # log likelihood with the prediction of each driver in the model
         self._scale, self._lots = np.zeros(count), np.zeros(count)
 
     @property
     def gained(self) -> Array:
-        """Log likelihood that a walk gains over none, (h,)."""
+        """Gain of log likelihood by a walk over none, (h,)."""
         return _gained(self.log_likelihood)
 
     def gained_beside(self, name: str) -> Array:
-        """Log likelihood that a walk gains with a driver's predictions in the model, (h,): what the driver does not explain."""
+        """Gain of log likelihood by a walk, with a driver's predictions in the model, (h,)."""
         known = self.beside.get(name)
         return np.zeros(self.log_likelihood.shape[1]) if known is None else _gained(known)
 
     def level(self, station: str) -> Level:
-        """The state of a station; a new one knows nothing."""
+        """The filter state of a station, unknown for a new one."""
         shape = self.log_likelihood.shape
         if station not in self.stations:
             self.stations[station] = Level(np.zeros(shape), np.zeros(shape), np.zeros(shape[1], dtype=bool))
         return self.stations[station]
 
     def innovation(self, station: str, size: Array, information: Array) -> Innovation:
-        """The innovation of a lot with sizes (h,) and information (h,); zero information: nothing is seen."""
+        """The innovation of a lot with sizes (h,) and information (h,); zero information: not measured."""
         level, seen = self.level(station), information > 0.0
         safe = np.where(seen, information, 1.0)
-        # the walk is measured in the noise of a typical lot
+        # the walk is in units of the noise variance of a typical lot
         typical = np.where(self._lots > 0.0, self._scale / np.maximum(self._lots, 1.0), 1.0 / safe)
         variance = level.variance + WALKS[:, None] * typical
         total = variance + 1.0 / safe
@@ -103,14 +103,14 @@ class Wander:
         rms: Array,
         told: Flags,
     ) -> tuple[Array, Array]:
-        """Innovation, and what the filter leaves of a driver's prediction over the noise of it, (h,) each.
+        """Innovation of a lot, and innovation of a driver's prediction in the same filter, (h,) each; updates the state.
 
-        The walk is that which the past prefers where the driver's predictions are in the model as well: a change that the driver
-        explains at all stations is no walk of each. The prediction is then taken into the past of the station.
+        The walk is the one that the past prefers with the driver's predictions in the model: a change that the driver explains at
+        all stations is not attributed to a walk of each.
 
         Parameters
         ----------
-        told : (h,), whether the prediction rests on enough lots: where it does not, a step is no sign of a walk
+        told : (h,), whether the prediction is based on enough lots; if not, a step does not count as evidence of a walk
         """
         level = self.level(station)
         likelihood = self.beside.setdefault(name, np.zeros_like(self.log_likelihood))
@@ -125,11 +125,11 @@ class Wander:
         return value, left
 
     def update(self, station: str, size: Array, information: Array, found: Innovation, rms: Array) -> None:
-        """Take a lot into the past of its station.
+        """Update the filter of a station with a lot.
 
         Parameters
         ----------
-        rms : (h,), of earlier innovations: larger ones than five of it count as five
+        rms : (h,), of earlier innovations; larger ones than five times it are clipped
         """
         level, seen = self.level(station), information > 0.0
         bounded = np.clip(found.every, -_LARGEST * rms, _LARGEST * rms)
@@ -153,7 +153,7 @@ class Wander:
         return out
 
     def restore(self, arrays: Mapping[str, Array]) -> None:
-        """Take a state."""
+        """Restore the state of :meth:`arrays`."""
         self.log_likelihood = arrays["likelihood"].copy()
         self._scale, self._lots = arrays["scale"].copy()
         for key, value in arrays.items():
@@ -170,23 +170,24 @@ class Wander:
 
 
 def over(values: Array, weights: Array) -> Array:
-    """Values over weights, zero where a weight is none."""
+    """Values divided by weights; zero where a weight is zero."""
     there = weights > 0.0
     return np.where(there, values / np.where(there, weights, 1.0), 0.0)
 
 
 def _likelihood(every: Array, found: Innovation, rms: Array) -> Array:
-    """Log likelihood (q, h) of innovations at each walk, over that without one; they count for five times their rms at most."""
+    """Log likelihood ratio (q, h) of innovations at each walk to that without one; innovations are clipped at five rms."""
     bounded = np.clip(every, -_LARGEST * rms, _LARGEST * rms) / np.maximum(rms, 1e-300)
     gained = -np.log(found.roots) - 0.5 * bounded**2
     return np.where(found.known, gained - gained[0], 0.0)
 
 
 def _gained(likelihood: Array) -> Array:
+    """Gain (h,) of the best walk over none, from log likelihoods (q, h)."""
     return np.max(likelihood[1:], axis=0) - likelihood[0]
 
 
 def _chosen_of(every: Array, likelihood: Array) -> Array:
-    """Values (h,) at the walks that a likelihood (q, h) prefers; without one unless it is clearly better."""
+    """Values (h,) of ``every`` (q, h) at the most likely walk; without a walk unless one is clearly better."""
     best = np.where(_gained(likelihood) > WALK_FROM, 1 + np.argmax(likelihood[1:], axis=0), 0)
     return every[best, np.arange(best.size)]

@@ -1,8 +1,7 @@
 """Handling errors that look like effects: a unit that moved, a wrong pose, a thermometer with an offset in one soak.
 
-Such alternatives have one to three coefficients, and take part in the same search as the effects, which have one for every unit
-and
-axis. They are of scope "data": no model is extended by them.
+Such alternatives have one to three coefficients and take part in the same search as the effects, which have a coefficient for
+every unit and axis. Their scope is "data": no model is extended by them.
 """
 
 from abc import abstractmethod
@@ -19,26 +18,26 @@ from inertial.state import State
 
 
 class Misfit(Protocol):
-    """How badly the model fits a lot of some units, by their numbers in the whole lot."""
+    """Misfit of the model on a lot that holds only some units, given by their indices in the complete lot."""
 
     def __call__(self, lot: "Lot", units: tuple[int, ...], *, own_noise: bool = False) -> float:
-        """The whitened sum of squares, or with the noise of that lot the deviance."""
+        """The whitened sum of squares; with ``own_noise`` the deviance at the noise estimated from that lot."""
         ...
 
 
 _LOCATIONS = 40
-EDGE = 3  # dwells at both ends after which, or before which, no change can be detected
-_SOAK_APART = 3.0  # K
+EDGE = 3  # dwells at each end of the run within which no change can be detected
+_SOAK_APART = 3.0  # difference of temperature, K, above which a dwell begins another soak
 
 
 class Handling(Effect):
     """A handling error.
 
-    fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
-    of_one_axis : whether it concerns the bias of one axis of one unit, at an ``axis``
-    several : whether an axis may have many of them, each from a ``dwell`` on, which are searched together
-    in_part : whether some units of a large lot stand for it: it is the same for all, and mended without a look at each
-    of_one : factor within which the coefficient must be one, where a part of the change has another cause; infinite elsewhere
+    fewest_units : number of units below which it cannot be separated from effects of the sensor and is not searched
+    of_one_axis : whether it changes the bias of a single axis of a single unit, given by ``unit`` and ``axis``
+    several : whether an axis may have several of them, each starting at a ``dwell``; they are searched together
+    in_part : whether a sample of units suffices to find and correct it in a large lot, because it is the same for all units
+    of_one : factor by which the coefficient may differ from one before another cause is assumed; infinite: any coefficient
     """
 
     scope: ClassVar[Literal["sensor", "station", "slot", "data"]] = "data"  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -56,7 +55,7 @@ class Handling(Effect):
         """The locations to search: values of ``unit``, ``other``, ``dwell``, ``soak`` or ``pose``; units in order."""
 
     def looks(self, lot: "Lot", locations: int) -> int:
-        """Number of locations in the price: those of the search, or all among which residuals have chosen them."""
+        """Number of locations that the price counts: those searched, or all from which the residuals preselected them."""
         return locations
 
     @abstractmethod
@@ -64,7 +63,7 @@ class Handling(Effect):
         """Columns of the affected units, (units or 1, n, 3, k), g per unit of the coefficient."""
 
     def of_each_unit(self, lot: "Lot", slope: Array | None, **location: float) -> Array:
-        """Columns (units or 1, n, 3, k) of the alternative in each unit, at a location without ``unit``; 1: equal in all."""
+        """Columns (units or 1, n, 3, k), g, with each unit in turn as the affected one; ``location`` has no ``unit``."""
         units = range(lot.state.time.shape[0])
         return np.concatenate([self.change(lot, slope, unit=float(unit), **location) for unit in units])
 
@@ -77,17 +76,17 @@ class Handling(Effect):
         return []
 
     def short(self, size: Array, **location: float) -> str:
-        """A short text for a location of :meth:`instead`; to be written where that gives any."""
+        """A short text for a location of :meth:`instead`; required where :meth:`instead` returns any."""
         raise NotImplementedError(
             f"{self.id}: 'instead' gives other locations, but 'short' has no text for them; write it"
         )
 
     def possible(self, size: Array) -> bool:
-        """Whether the alternative can have coefficients (k,); beyond them another cause has its shape."""
+        """Whether the coefficients (k,) are physically possible; if not, another cause with the same columns is assumed."""
         return bool(np.isinf(self.of_one) or 1.0 / self.of_one < size[0] < self.of_one)
 
     def near(self, lot: "Lot", **location: float) -> list[dict[str, float]]:
-        """The location, and those between it and its neighbours in :meth:`locations`."""
+        """The location, and those between it and the adjacent ones of :meth:`locations`."""
         if "dwell" not in location:
             return [location]
         n, step = lot.state.time.shape[1], stride(lot)
@@ -95,7 +94,7 @@ class Handling(Effect):
         return [{**location, "dwell": float(k)} for k in range(low, high + 1)]
 
     def placed(self, lot: "Lot", **location: float) -> dict[str, float]:
-        """The location in a lot with the dwells that were left out of the search."""
+        """The location in ``lot``, which includes the dwells that the search left out."""
         return location
 
     def mended(self, lot: "Lot", size: Array, **location: float) -> "Lot | None":
@@ -103,7 +102,7 @@ class Handling(Effect):
         return None
 
     def settled(self, lot: "Lot", size: Array, misfit: Misfit, **location: float) -> "Lot | None":
-        """The mended lot if it needs more than the coefficients; ``misfit`` is that of the model on a lot of some units."""
+        """The result of :meth:`mended` where the correction needs a further fit; ``misfit``: misfit of a corrected lot."""
         return self.mended(lot, size, **location)
 
     def dwells(self, lot: "Lot", **location: float) -> list[int]:
@@ -111,11 +110,11 @@ class Handling(Effect):
         return [int(location["dwell"])] if "dwell" in location else []
 
     def units(self, **location: float) -> tuple[int, ...]:
-        """The affected units; none where all are."""
+        """Indices of the affected units; empty if all units are affected."""
         return tuple(int(location[name]) for name in ("unit", "other") if name in location)
 
     def columns(self, lot: "Lot", slope: Array | None, **location: float) -> Array:
-        """Columns of all blocks, (blocks, n, k); zero in unaffected units."""
+        """Columns of all blocks, (blocks, n, k), g per unit of the coefficient; zero in unaffected units."""
         change = of_outputs(lot, self.change(lot, slope, **location))
         units, n = lot.state.time.shape
         changes = np.zeros((units, n, len(lot.state.axes), change.shape[-1]))
@@ -131,16 +130,16 @@ class OfOneDwell(Handling):
 
     @abstractmethod
     def every_dwell(self, lot: "Lot") -> Array:
-        """Columns (units or 1, n, 3, k) for each dwell in turn."""
+        """Columns (units or 1, n, 3, k), g per unit of the coefficient, of an error in each of the n dwells."""
 
 
 def of_outputs(lot: "Lot", change: Array) -> Array:
-    """Changes (units or 1, n, 3 or m, k) of the outputs that there are: a change of force shows on the axes that have one."""
+    """Changes (units or 1, n, m, k) on the m measured axes, from changes (units or 1, n, 3 or m, k) of force or output."""
     return change if change.shape[2] == len(lot.state.axes) else of_axes(change, lot.state.axes, 2)
 
 
 def by_block(change: Array) -> Array:
-    """Columns (units, n, m, k) by block, (m·units, n, k)."""
+    """Columns (units, n, m, k) rearranged by block, (m·units, n, k)."""
     units, n, m, k = change.shape
     return np.swapaxes(change, 1, 2).reshape(m * units, n, k)
 
@@ -174,17 +173,17 @@ def common_force(lot: "Lot") -> Array:
 
 
 def rotated_force(lot: "Lot") -> Array:
-    """What small rotations about x, y, z add to the forces, (units or 1, n, 3, 3), g per rad."""
+    """Changes of the force by small rotations about x, y, z, (units or 1, n, 3, 3), g/rad."""
     return lot.state.remember(("rotated_force",), lambda: turns(common_force(lot)))
 
 
 def turns(force: Array) -> Array:
-    """What small rotations about x, y, z add to forces (..., n, 3), by axis and rotation: (..., n, 3, 3), g per rad."""
+    """Changes of forces (..., n, 3) by small rotations about x, y, z: (..., n, 3, 3), axis before rotation, g/rad."""
     return np.stack([np.cross(e, force) for e in np.eye(3)], axis=-1)
 
 
 def tilts(state: State) -> Array:
-    """What small errors of the outer and inner angle add to the forces, (units or 1, n, 3, 2), g per rad."""
+    """Changes of the force by small errors of the outer and inner angle, (units or 1, n, 3, 2), g/rad."""
     outer, inner = state.outer, state.inner
     if outer is None or inner is None:
         return np.zeros((*state.force.shape, 0))
@@ -195,17 +194,17 @@ def tilts(state: State) -> Array:
 
 
 def pose_errors(state: State) -> Array:
-    """What a pose that is off adds to the forces of a dwell, (units or 1, n, 3, 2), g per rad: two errors of its direction.
+    """Changes of a dwell's force by two errors of the direction of its pose, (units or 1, n, 3, 2), g/rad.
 
-    Of the two angles of a table; of forces that are stated, and the same for all units, along two directions across each force.
-    No columns where neither is known.
+    The errors are those of the two table angles where these are known, else rotations in two directions perpendicular to the
+    stated force if it is the same for all units. Otherwise the last dimension is 0.
     """
     if state.outer is not None and state.inner is not None:
         return tilts(state)
     force = common(np.broadcast_to(state.force, (*state.time.shape, 3)))
     if len(force) > 1:
         return np.zeros((*state.force.shape, 0))
-    # dwells of one pose have the same two directions, though their forces may be some µg apart
+    # rounded, so that dwells of one pose, whose forces may differ by some µg, get the same two directions
     least = np.eye(3)[np.argmin(np.round(np.abs(force), 3), axis=-1)]
     first = np.cross(least, force)
     first *= np.linalg.norm(force, axis=-1, keepdims=True) / np.maximum(
@@ -216,13 +215,13 @@ def pose_errors(state: State) -> Array:
 
 
 def poses(lot: "Lot") -> Places:
-    """Number of the pose of each dwell, (n,)."""
+    """Index of the pose of each dwell, (n,)."""
     force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]
     return np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def soaks(state: State) -> Places:
-    """Number of the soak of each dwell, (n,); all zero at constant temperature."""
+    """Index of the soak of each dwell, (n,); all zero at constant temperature."""
     return state.remember(("soaks",), lambda: _soaks(state).astype(np.float64)).astype(np.intp)
 
 

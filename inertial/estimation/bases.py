@@ -1,14 +1,14 @@
-"""Bases of what columns span, eigenvalues of their products, and what is visible of a column."""
+"""Orthonormal bases of column spaces, eigenvalues of Gram matrices, and the threshold of visibility of a column."""
 
 import numpy as np
 
 from inertial.arrays import Array, Places
 
 SEEN = 0.01
-"""Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
+"""Norm of a column beyond the base model, over its norm, below which it is not visible: noise of the drivers leaves as much."""
 
 _LEFT = 1e-8
-"""Part of the sum of squares of a target that rounding leaves of it."""
+"""Share of a target's sum of squares that remains by rounding where a projection removes all of it."""
 
 
 def eigen(gram: Array) -> tuple[Array, Array]:
@@ -27,7 +27,7 @@ def _eigen_of_two(gram: Array) -> tuple[Array, Array]:
     reach, middle = np.hypot(half, beside), 0.5 * (first + second)
     values, vectors = np.empty(gram.shape[:-1]), np.empty(gram.shape)
     values[..., 0], values[..., 1] = middle - reach, middle + reach
-    # of the two equal forms of a component the one without a difference of nearly equal numbers
+    # the form of each component that avoids cancellation
     large = np.hypot(reach + np.abs(half), beside)
     known = large > 0.0
     large = np.where(known, large, 1.0)
@@ -42,34 +42,34 @@ def _eigen_of_two(gram: Array) -> tuple[Array, Array]:
 
 
 def inverse_roots(values: Array, least: float) -> Array:
-    """One over the roots of eigenvalues (...); zero where they are not above the least that counts."""
+    """Inverse square roots of eigenvalues (...); zero for eigenvalues not above ``least``."""
     seen = values > least
     return np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
 
 
 def unit_columns(columns: Array) -> tuple[Array, Array]:
-    """Columns (blocks, n, p) of unit length, and their lengths (blocks, p); those that are zero stay so, of length one."""
+    """Columns (blocks, n, p) scaled to unit length, and their lengths (blocks, p); a zero column stays zero with length one."""
     size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
     size = np.where(size > 0.0, size, 1.0)
     return columns / size[:, None, :], size
 
 
 def orthonormal(columns: Array) -> tuple[Array, Places]:
-    """Orthonormal bases (blocks, n, p) of what the columns span, directions below the tolerance zeroed; ranks (blocks,)."""
+    """Orthonormal bases (blocks, n, p) of the column spaces, dependent directions set to zero; and the ranks (blocks,)."""
     return basis(columns)[:2]
 
 
 def basis(columns: Array) -> tuple[Array, Places, float]:
-    """Bases and ranks as of :func:`orthonormal`, and the logarithm of the determinant of the columns' products over all blocks.
+    """Bases and ranks as of :func:`orthonormal`, and the log-determinant of the columns' Gram matrices, summed over the blocks.
 
-    Directions that vanish count with a limit.
+    Eigenvalues of the scaled Gram matrix below ``SEEN``² count as ``SEEN``².
     """
     if columns.shape[-1] == 0:
         return columns, np.zeros(len(columns), dtype=np.intp), 0.0
     q, size = unit_columns(columns)
     keep = np.ones((1, 1), dtype=bool)
     determinant: float | None = None
-    for tolerance in (1e-9, 0.5):  # the second turn removes rounding errors of the first
+    for tolerance in (1e-9, 0.5):  # the second pass removes rounding errors of the first
         values, vectors = np.linalg.eigh(np.swapaxes(q, -1, -2) @ q)
         if determinant is None:
             determinant = float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(size)))
@@ -79,9 +79,9 @@ def basis(columns: Array) -> tuple[Array, Places, float]:
 
 
 def schur(gram: Array, full: Array | None = None) -> float:
-    """Sum of squares of the first target after the others.
+    """Residual sum of squares of the first target after regression on the others, from their Gram matrix (t, t).
 
-    full : products of the targets of which these are left; a target of which rounding is left explains nothing
+    full : Gram matrix (t, t) before a projection; a target whose remaining sum of squares is rounding error is left out
     """
     squares = np.diag(gram)[1:]
     seen = squares > (0.0 if full is None else _LEFT * np.diag(full)[1:])

@@ -14,10 +14,11 @@ class Candidate:
 
     columns : (rows, n, grid, p), g per unit of the coefficient
     shared : whether all blocks share the p coefficients
-    rows : (blocks,), the row of each block, every row for as many blocks; None where each block has a row of its own
-    units : the units that the columns are of, each with coefficients of its own for its three axes; those of the others are zero.
-        All units if None. Only where shared
-    key : under which products of the columns are stored; not stored if None
+    rows : (blocks,), index into ``columns`` for each block, every row used equally often; None: one row per block
+    units : indices of the units that the columns belong to, each with its own p coefficients for all its axes; the columns are
+        zero in other units. None: all units. Only where ``shared``
+    key : key under which products of the columns are stored; None: not stored
+    per_unit : number of blocks (axes) of a unit
     """
 
     columns: Array
@@ -34,17 +35,17 @@ class Candidate:
 
     @property
     def blocks(self) -> Places | None:
-        """The blocks of the units that the columns are of; None for all."""
+        """Indices of the blocks of ``units``; None for all blocks."""
         return None if self.units is None else blocks_of_units(self.units, self.per_unit)
 
 
 def blocks_of_units(units: Places, per_unit: int) -> Places:
-    """The blocks of some units, (units · axes,)."""
+    """Indices of the blocks of some units, (units · axes,)."""
     return (per_unit * units[:, None] + np.arange(per_unit)).reshape(-1)
 
 
 def times_rows(rows: Array, candidate: Candidate) -> Array:
-    """Rows (blocks, k, n) times the columns of a candidate, (b, grid, p, k)."""
+    """Products (b, grid, p, k) of rows (blocks, k, n) and the columns of a candidate; b: its blocks."""
     if candidate.blocks is not None:
         rows = rows[candidate.blocks]
     count, n, grid, p = candidate.columns.shape
@@ -53,10 +54,10 @@ def times_rows(rows: Array, candidate: Candidate) -> Array:
     if candidate.rows is None:
         product = rows @ flat
     elif blocks != count * int(np.bincount(candidate.rows, minlength=count).min()):
-        # some blocks of a row are missing: they have a whitener of their own
+        # not every block of a row is here: some use another whitener
         product = rows @ flat[candidate.rows]
     else:
-        # the blocks of each row beside each other: one product of matrices for all of them
+        # sorted by row, so that one matrix product serves all blocks of a row
         order = np.argsort(candidate.rows, kind="stable")
         sorted_ = bool(np.all(order[1:] > order[:-1]))
         product = ((rows if sorted_ else rows[order]).reshape(count, -1, n) @ flat).reshape(blocks, k, grid * p)
@@ -66,17 +67,19 @@ def times_rows(rows: Array, candidate: Candidate) -> Array:
 
 
 def shared_rows(columns: Array, per_unit: int) -> Places | None:
-    """The row of each block where columns (blocks, ...) are equal: of all blocks, by axis, or in each unit; else None.
+    """Index (blocks,) of the distinct columns of each block; None if no blocks share columns (blocks, ...).
+
+    Columns may be equal in all blocks, in all units on the same axis, or on all axes of a unit.
 
     Parameters
     ----------
-    per_unit : blocks of a unit: one for each axis, or one alone
+    per_unit : number of blocks of a unit: its axes, or 1 where only the norm is known
     """
     blocks = len(columns)
     if per_unit == 1:
         return np.zeros(blocks, dtype=np.intp) if np.all(columns == columns[:1]) else None
     by_unit = columns.reshape(-1, per_unit, *columns.shape[1:])
-    # most candidates differ in a few values already
+    # the last dwell is compared first: it already differs for most candidates
     axes = np.array_equal(by_unit[-1, 0, -1], by_unit[-1, -1, -1]) and bool(np.all(by_unit == by_unit[:, :1]))
     units = len(by_unit) > 1 and np.array_equal(by_unit[-1, :, -1], by_unit[0, :, -1])
     units = units and bool(np.all(by_unit == by_unit[:1]))
@@ -88,7 +91,10 @@ def shared_rows(columns: Array, per_unit: int) -> Places | None:
 
 
 def finest_rows(rows_of: Sequence[Places | None], per_unit: int) -> Places | None:
-    """The rows of blocks for the columns of several values: where they differ at one, they differ."""
+    """Row indices (blocks,) that suit the columns at all parameter values: blocks share a row only if they do at every value.
+
+    None if each block needs its own row; ``rows_of`` has the indices of :func:`shared_rows` at each value.
+    """
     known = [rows for rows in rows_of if rows is not None]
     if len(known) < len(rows_of):
         return None

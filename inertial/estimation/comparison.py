@@ -41,8 +41,8 @@ def estimate(model: Model) -> Estimate:
     shared, shared_error = np.zeros(0), np.zeros(0)
     variance = space.variance
     if z.shape[-1]:
-        free = _free(unit, inverse, z)
-        target = _free(unit, inverse, y[..., None])[..., 0]
+        free = _beyond_local(unit, inverse, z)
+        target = _beyond_local(unit, inverse, y[..., None])[..., 0]
         flat = free.reshape(-1, z.shape[-1])
         shared = np.linalg.lstsq(flat, target.reshape(-1), rcond=1e-9)[0].astype(np.float64)
         # nearly collinear columns can give diagonals slightly below zero by rounding
@@ -51,15 +51,15 @@ def estimate(model: Model) -> Estimate:
         y = y - z @ shared
     right = np.einsum("bnp,bn->bp", unit, y)
     scaled = np.einsum("bpr,br->bp", inverse, right)
-    scaled = _pooled(model, unit, right, scaled, variance * inverse, size)
+    scaled = _shrunk_to_lot(model, unit, right, scaled, variance * inverse, size)
     return Estimate(model.terms, scaled / size, shared, shared_error)
 
 
 CONDITION = 1e-8
-"""Directions of the scaled normal matrix below this are scatter of the angles, not effects: they get no coefficient."""
+"""Relative eigenvalue of the scaled normal matrix below which a direction, due to scatter of the angles, gets no coefficient."""
 
 OWN = ("bias", "scale", "misalignment", "turn_on_bias")
-"""Effects whose coefficients each unit has for itself: they are not shrunk towards the lot's mean."""
+"""Effects whose coefficients differ from unit to unit by nature: they are not shrunk towards the lot's mean."""
 
 _FEW_UNITS = 4
 
@@ -67,11 +67,11 @@ _VANISHED = 1e-100
 """Size of a whitened column below which its squares leave the range of numbers."""
 
 
-def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: Array, size: Array) -> Array:
-    """Coefficients shrunk towards the lot's mean, as far as their scatter over the units is smaller than their errors.
+def _shrunk_to_lot(model: Model, unit: Array, right: Array, scaled: Array, covariance: Array, size: Array) -> Array:
+    """Scaled coefficients (blocks, p), shrunk towards the lot's mean by their errors relative to their scatter over the units.
 
     Empirical Bayes with the moments of the lot (Efron & Morris, J. Am. Stat. Assoc. 70 (1975) 311): a coefficient that the run
-    determines poorly, and that units of one type have in common, is predicted better from all of them.
+    determines poorly, and that is similar in units of one type, is predicted better from all units.
     """
     problem = model.problem
     units = problem.lot.state.time.shape[0]
@@ -104,8 +104,8 @@ def _shrinkable(model: Model, count: int) -> Flags:
     return flags
 
 
-def _free(unit: Array, inverse: Array, columns: Array) -> Array:
-    """Columns without the part that the local ones explain."""
+def _beyond_local(unit: Array, inverse: Array, columns: Array) -> Array:
+    """Columns (blocks, n, m) after projection on the local columns ``unit`` (blocks, n, p)."""
     return columns - unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ columns))
 
 
@@ -171,10 +171,10 @@ class Fitting:
 
 
 def fitted_residuals(model: Model) -> Array:
-    """THE residuals of a model on its own dwells, (blocks, n) in g, of which everything that is printed and drawn is made.
+    """Residuals (blocks, n), g, of a model on the dwells it is fitted to; all printed and plotted residuals are these.
 
-    Of least squares weighted by the white standard errors: what the model cannot follow, whatever noise is assumed. At a noise
-    that has taken a missing effect for wander, generalised least squares leaves more. With unknown poses they are those of the
+    They are those of least squares weighted by the white standard errors, which do not depend on the assumed wander: where wander
+    has absorbed a missing effect, generalised least squares leaves larger residuals. With unknown poses they are those of the
     published fit.
     """
     problem = model.problem
@@ -186,7 +186,10 @@ def fitted_residuals(model: Model) -> Array:
 
 
 def _solver(x: Array, weight: Array) -> Callable[[Array], Array]:
-    """What gives the coefficients (blocks, p, m) of weighted least squares on columns (blocks, n, p) for targets (..., m)."""
+    """A function from targets (blocks, n, m) to their coefficients (blocks, p, m), by weighted least squares on ``x``.
+
+    x : (blocks, n, p), columns; weight : (blocks, n)
+    """
     unit, size = unit_columns(x * weight[..., None])
     across = np.swapaxes(unit, -1, -2)
     inverse = np.linalg.pinv(across @ np.swapaxes(across, -1, -2), rcond=1e-9, hermitian=True)
@@ -194,11 +197,11 @@ def _solver(x: Array, weight: Array) -> Callable[[Array], Array]:
 
 
 _WARMER = 0.5
-"""Change of temperature, K, by which the response to it is found."""
+"""Half step of temperature, K, of the numerical derivative."""
 
 
 def slope_of(model: Model) -> Array | None:
-    """∂E/∂T of every unit at every dwell, (units, n, 3), g/K; None if no temperature is recorded or the model has none."""
+    """Derivative of the model's output by temperature, (units, n, 3), g/K; None without a temperature in record or model."""
     lot = model.problem.lot
     state = lot.state
     if state.temperature is None or lot.radial:

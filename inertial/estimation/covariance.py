@@ -1,9 +1,9 @@
 """Whitening of a lot's series: white noise, 1/f and random walk, with whiteners shared by equal blocks.
 
 A block is the series of one unit and axis. Its covariance is s²·(diag(e²) + F·K_F + W·K_W), where e is the white standard error
-of its dwells and F and W, in units of the lot's white variance, are the same for all blocks but those whose wander is of another
-kind (:mod:`inertial.estimation.shares`). Blocks that have the same dwells at
-the same times and about the same white noise share a whitener; a missing dwell only leaves out its row.
+of its dwells; F and W, in units of the lot's white variance, are the same for all blocks but those with shares estimated for
+the block alone (:mod:`inertial.estimation.shares`). Blocks with the same dwell times and similar white noise share a whitener;
+a missing dwell only leaves out its row.
 
 Where only the norm of gravity is known, a block is a unit. Wander along one axis enters the norm in proportion to the force along
 that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directions u of the force.
@@ -24,32 +24,33 @@ from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
 
 PIECE = 1_000_000
-"""Largest number of columns' values that are whitened at a time."""
+"""Largest number of column elements that are whitened at a time."""
 
 _WHITENERS = 18_000_000
-"""Largest number of stored whiteners."""
+"""Largest number of stored matrix elements of whiteners."""
 
 _PRODUCTS = 2_000_000
 """Largest number of stored products of columns."""
 
 LARGE = 15_000
-"""Values of a column of all blocks above which columns are not stored between passes: a store has room for a small part of those
-that a pass goes through in turn, and each would be gone before it is used again."""
+"""Number of measurements (blocks · dwells) above which columns are not stored between passes: the store would hold only a small
+part of the columns of a pass, and each would be displaced before it is used again."""
 
 
 @lru_cache(maxsize=256)
-def _lattice(shares: Shares) -> tuple[int | None, ...]:
-    """The steps of the lattice at which shares stand; None for none."""
+def _lattice_indices(shares: Shares) -> tuple[int | None, ...]:
+    """Lattice indices of the shares of 1/f and of random walk; None for a share of zero."""
     return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in (shares.flicker, shares.walk))
 
 
 def _pieces(members: Places, size: int) -> list[Places]:
-    """Members in pieces whose values, each of some size, are worked on at a time."""
+    """Member indices split into pieces small enough to be processed at a time; ``size``: elements of one member."""
     few = max(PIECE // max(size, 1), 1)
     return np.split(members, range(few, members.size, few))
 
 
-def _of_steps(covariance: Array) -> float:
+def _half_step_variance(covariance: Array) -> float:
+    """Half the mean variance of the steps between neighbouring dwells, from their covariance (n, n)."""
     if len(covariance) < 2:
         return 0.0
     each = np.diagonal(covariance)
@@ -103,7 +104,7 @@ class Covariance:
         self._used = 0
 
     def like(self, larger: "Covariance") -> None:
-        """Take the whiteners of another covariance, of more blocks, where the blocks of each have one in common."""
+        """Use the whiteners of another covariance, of more blocks, if both have a single and equal profile of dwells."""
         kernels, whiteners = larger._kernels, larger._whiteners  # noqa: SLF001  # of its own kind
         kernel, other = self._kernels[0], kernels[0]
         same = len(self._kernels) == len(kernels) == 1 and other.fits(kernel.time, kernel.there, kernel.profile)
@@ -111,7 +112,7 @@ class Covariance:
             self._whiteners = whiteners
 
     def squares_left(self, noise: Noise, local: Array, shared: Array, residual: Array) -> tuple[float, float]:
-        """Sums of squares, g², of the residuals of a fit weighted by the white errors: what noise leaves in them, and they hold.
+        """Expected and actual sum of squares, g², of the residuals of a fit weighted by the white errors.
 
         With P = I − LLᵀ of the block's own columns, each block's residuals P·z − S·Σ Sᵀz have the covariance
         P·V·P − P·V·S·Sᵀ − S·Sᵀ·V·P + S·(Σ SᵀVS)·Sᵀ, of which the diagonal counts.
@@ -139,9 +140,9 @@ class Covariance:
         return self.white * (left + float(np.sum(weight * between))), self.white * held
 
     def _variances(self, shares: Shares) -> Iterator[tuple[Places, Array, Array]]:
-        """Blocks that have in common the covariance (n, n) of their dwells over the white one, and the white errors (n,).
+        """Groups of blocks with equal covariance: the blocks, their covariance (n, n) over the white one, white errors (n,).
 
-        Both are zero where a dwell is missing.
+        Covariance and errors are zero where a dwell is missing.
         """
         for index, steps, blocks, common in self._groups_at(shares):
             kernel = self._kernels[index]
@@ -152,8 +153,8 @@ class Covariance:
             yield blocks, variance, np.where(kernel.there, kernel.white, 0.0)
 
     def side_by_side(self, shares: Shares) -> Array:
-        """Half the mean variance of the wander's steps from one dwell to the next, over the white variance, (blocks,)."""
-        return self._of_wander(shares, _of_steps)
+        """Half the mean variance of the wander's steps between neighbouring dwells, over the white variance, (blocks,)."""
+        return self._of_wander(shares, _half_step_variance)
 
     def _of_wander(self, shares: Shares, variance_of: Callable[[Array], float]) -> Array:
         """A variance of the wander of each block over its white variance, (blocks,), from the covariance of its dwells."""
@@ -166,7 +167,7 @@ class Covariance:
         return variance
 
     def _groups_at(self, shares: Shares) -> list[tuple[int, int, Places, Shares]]:
-        """Groups of blocks that have a whitener in common at shares: index of the profile, steps, blocks, and their shares."""
+        """Groups of blocks that share a whitener at given shares: index of the profile, steps, blocks, and their shares."""
         common = shares.common
         if not shares.by_block:
             return [(*group, common) for group in self._groups]
@@ -179,25 +180,25 @@ class Covariance:
 
     @cached_property
     def _group_of(self) -> dict[int, tuple[int, int]]:
-        """Index of the profile of each block, and its steps."""
+        """For each block the index of its profile, and the lattice steps by which its shares exceed the lot's."""
         return {int(block): (index, steps) for index, steps, blocks in self._groups for block in blocks}
 
     def like_of(self, block: int, noise: Noise) -> tuple[object, ...]:
-        """What blocks have in common whose noise differs by a factor alone."""
+        """A key that is equal for blocks whose noise covariances differ by a factor only."""
         return (*self._group_of[block], noise.shares.of_block(block))
 
     def whitener_of_block(self, block: int, shares: Shares) -> Whitener:
-        """What makes the noise of a block at shares white."""
+        """The whitener of a block at given shares."""
         return self._whitener(*self._group_of[block], shares)
 
     def _whitener(self, profile_index: int, steps: int, shares: Shares) -> Whitener:
-        index = [None if step is None else step + steps for step in _lattice(shares)]
+        index = [None if step is None else step + steps for step in _lattice_indices(shares)]
         key = (profile_index, index[0], index[1])
         if key not in self._whiteners:
             wander = self._wander if index != [None, None] else None
             kernels = None if wander is None else (wander[0][profile_index], wander[1][profile_index])
             self._whiteners[key] = whitener_of(self._kernels[profile_index], index, kernels)
-            # applied to many blocks, a whitener costs little beside its use
+            # for many blocks, making a whitener costs little compared with applying it: fewer are stored
             room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 6
             most = max(room // self.there.shape[1] ** 2, 4)
             while len(self._whiteners) > most:
@@ -206,7 +207,7 @@ class Covariance:
         return self._whiteners[key]
 
     def _by_whitener(self, shares: Shares, blocks: Places | None = None) -> Iterator[tuple[Places, Whitener]]:
-        """Positions, among all or some blocks, of those that share a whitener, and the whitener."""
+        """Groups of blocks that share a whitener, as positions among ``blocks`` (all if None), and the whitener of each."""
         where = np.arange(len(self.level))
         if blocks is not None:
             where = np.full(len(self.level), -1)
@@ -218,7 +219,7 @@ class Covariance:
                 yield positions, self._whitener(index, steps, common)
 
     def whiten(self, columns: Array, shares: Shares, blocks: Places | None = None) -> Array:
-        """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
+        """Columns (blocks, n, m) of all or some blocks, whitened to noise of variance s²; zero where a dwell is missing."""
         level = self.level if blocks is None else self.level[blocks]
         out = np.empty(columns.shape)
         for members, whitener in self._by_whitener(shares, blocks):
@@ -227,18 +228,18 @@ class Covariance:
         return out
 
     def whiteners(self, shares: Shares) -> Iterator[tuple[Places, Array]]:
-        """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
+        """Groups of blocks that share a whitener, and the whitener (n, n), lower triangular, for white noise of variance one."""
         return ((members, whitener.matrix) for members, whitener in self._by_whitener(shares))
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
-        """Series (blocks, m, n), g, with this noise, in place of independent normal numbers; zero where a dwell is missing."""
+        """Series (blocks, m, n), g, with this noise, made in place from independent normal numbers; zero at missing dwells."""
         for members, whitener in self._by_whitener(noise.shares):
             for some in _pieces(members, drawn[0].size):
                 drawn[some] = whitener.coloured(drawn[some]) * (self.level * noise.scale)[some, None, None]
         return drawn
 
     def white_rows(self, rows: Array, shares: Shares, blocks: slice) -> Array:
-        """Series (b, m, n) of some blocks with white noise of variance one over their level in them, overwritten."""
+        """Series (b, m, n) of some blocks, whitened in place: noise of variance one after division by the level."""
         for members, whitener in self._by_whitener(shares, np.arange(len(self.level))[blocks]):
             if members.size == len(rows):
                 return whitener.rows(rows, overwrite=True)

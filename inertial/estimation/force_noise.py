@@ -1,9 +1,9 @@
-"""Noise of a dwell that depends on the force along the axis: of a reference voltage, of a floor that tilts the table.
+"""Noise of a dwell that depends on the force along the axis, as from a reference voltage or from a floor that tilts the table.
 
-A lot's covariance has one white variance for every unit and axis. Where it grows with the force, the residuals of the poses along
-gravity look like a curve of the transfer function. The dependence is estimated before any effect is searched, from poses that
-were measured several times: a mean of each pose takes up what repeats with the pose, whatever its curve, and what all units do
-together at a dwell is taken off. Without repeated poses nothing can be told.
+A lot's covariance has one white variance for every unit and axis. Where the variance grows with the force, the residuals of poses
+along gravity look like a nonlinear transfer function. The dependence is estimated before any effect is searched, from poses that
+were measured several times: the mean of each pose absorbs whatever repeats with the pose, and the median over the units removes
+what is common to all units at a dwell. Without repeated poses the dependence cannot be estimated.
 """
 
 from itertools import combinations
@@ -25,26 +25,26 @@ _EDGES = (1.0 / 3.0, 2.0 / 3.0)
 """Forces along the axis, in parts of the largest, between which the scatter is compared."""
 
 _FEWEST = 6
-"""Dwells of an axis between two edges from which on they have a scatter."""
+"""Smallest number of dwells of an axis in a class of force whose scatter is estimated."""
 
 _LEFT = 0.25
 """Share of the dwells that poses and soaks must leave as degrees of freedom."""
 
 _FAR = 9.0
-"""Square over that of its class beyond which a dwell is bad, and counts as this."""
+"""Limit of a squared residual, over the typical square of its class of force: larger ones are clipped to it."""
 
 _LEAST = 0.03
-"""Part of the white variance of an axis that a dwell has at the least."""
+"""Lower bound of a dwell's white variance, over that of its axis."""
 
 _ROUNDS = 5
 
 
 def by_force(model: Model, soak: Places | None = None) -> Array | None:
-    """Standard deviation of the white noise of each dwell over its axis', (units, n, axes); None where force makes no difference.
+    """White standard deviation of each dwell over that of its axis, (units, n, axes); None if it does not depend on force.
 
     Parameters
     ----------
-    soak : (n,), number of the soak of each dwell, where the temperatures of the model are not those that tell it
+    soak : (n,), index of the soak of each dwell, where it must not be taken from the temperatures of the model
     """
     problem, covariance = model.problem, model.problem.covariance
     units, n = problem.lot.state.time.shape
@@ -52,7 +52,7 @@ def by_force(model: Model, soak: Places | None = None) -> Array | None:
         return None
     soak = soaks(problem.lot.state) if soak is None else soak
     force = np.broadcast_to(problem.lot.state.force, (units, n, 3))
-    q = _taken_up(force[0], np.broadcast_to(problem.lot.state.time, (units, n))[0], soak)
+    q = _pose_and_soak_basis(force[0], np.broadcast_to(problem.lot.state.time, (units, n))[0], soak)
     complete = covariance.there.reshape(units, -1).all(axis=1)
     if q is None or not complete.any():
         return None
@@ -70,24 +70,26 @@ def by_force(model: Model, soak: Places | None = None) -> Array | None:
     scale = (covariance.level * model.noise.scale)[:, None] ** 2
     alone = (problem.error / covariance.level[:, None]) ** 2 * scale
     projector = np.eye(n) - q @ q.T
-    slow = _slow_left(model, projector) * scale
+    slow = _projected_slow_variance(model, projector) * scale
     alone[~complete_blocks] = alone[complete_blocks].mean()
-    sizes = _by_class((left**2 / (alone @ projector**2 + slow))[complete_blocks], along[complete_blocks])
+    sizes = _log_squares_by_class((left**2 / (alone @ projector**2 + slow))[complete_blocks], along[complete_blocks])
     if sizes is None or not differ(sizes):
         return None
     variance = np.ones_like(left)
-    for _ in range(_ROUNDS):  # each dwell's residual holds noise of the others
+    for _ in range(_ROUNDS):  # iterated, because each residual contains noise of the other dwells
         white = (alone * variance) @ projector**2
         ratio = (left**2 / (white + slow))[complete_blocks]
         ratio /= ratio.mean(axis=1, keepdims=True)
-        curve = _curve(along[complete_blocks], np.minimum(ratio, _capped(ratio, along[complete_blocks])), along)
+        curve = _variance_at(
+            along[complete_blocks], np.minimum(ratio, _clipping_limits(ratio, along[complete_blocks])), along
+        )
         variance *= np.maximum((curve * (white + slow) - slow) / white, _LEAST)
         variance = np.maximum(variance / np.mean(variance, axis=1, keepdims=True), _LEAST)
     return np.swapaxes(np.sqrt(variance).reshape(units, problem.per_unit, n), 1, 2)
 
 
-def _taken_up(force: Array, time: Array, soak: Places) -> Array | None:
-    """Orthonormal columns (n, p) of each pose, and of bias, drift and response of each soak; None where they leave too little."""
+def _pose_and_soak_basis(force: Array, time: Array, soak: Places) -> Array | None:
+    """Orthonormal columns (n, p): mean per pose; bias, drift, response per soak; None if they leave too few dwells."""
     n = len(force)
     pose = np.full(n, -1)
     for k in range(n):
@@ -103,8 +105,8 @@ def _taken_up(force: Array, time: Array, soak: Places) -> Array | None:
     return q if n - q.shape[1] >= max(_FEWEST, _LEFT * n) else None
 
 
-def _slow_left(model: Model, projector: Array) -> Array:
-    """Variance (blocks, n) that a projector (n, n) leaves of the slow noise of a model, over the variance of each block."""
+def _projected_slow_variance(model: Model, projector: Array) -> Array:
+    """Variance (blocks, n) of the model's slow noise after a projector (n, n), over the variance of each block."""
     covariance, dwells = model.problem.covariance, np.arange(model.problem.n)
     known: dict[tuple[object, ...], Array] = {}
     slow = np.empty(model.problem.y.shape)
@@ -119,8 +121,8 @@ def _slow_left(model: Model, projector: Array) -> Array:
     return slow
 
 
-def _by_class(ratio: Array, along: Array) -> Array | None:
-    """Logarithms (blocks, classes) of the mean square of each class of force; None where there is but one class."""
+def _log_squares_by_class(ratio: Array, along: Array) -> Array | None:
+    """Log mean squares (blocks, classes) of the ratios in each class of force; None for fewer than two classes or blocks."""
     classes = np.digitize(along, _EDGES)
     filled = [k for k in range(len(_EDGES) + 1) if np.all(np.sum(classes == k, axis=1) >= _FEWEST)]
     if len(filled) < 2 or len(ratio) < 2:
@@ -129,8 +131,8 @@ def _by_class(ratio: Array, along: Array) -> Array | None:
     return np.log(np.maximum(inner, 1e-300))
 
 
-def _capped(ratio: Array, along: Array) -> Array:
-    """Squares (blocks, n) over the mean of their block beyond which a dwell is bad."""
+def _clipping_limits(ratio: Array, along: Array) -> Array:
+    """Clipping limits (blocks, n) of the squared residuals ``ratio`` (blocks, n), from the median of their class of force."""
     classes = np.digitize(along, _EDGES)
     middle = np.array(
         [np.median(ratio[classes == k]) if np.any(classes == k) else np.inf for k in range(len(_EDGES) + 1)]
@@ -138,17 +140,17 @@ def _capped(ratio: Array, along: Array) -> Array:
     return _FAR * middle[classes] / NORMAL_MEDIAN**2
 
 
-def _curve(along: Array, ratio: Array, at: Array) -> Array:
-    """Variance at forces along the axis: a quadratic in their square, nowhere negative, by least squares."""
-    basis, fitted, sizes = _quadratic(along.ravel()), np.ones(along.size), np.ones(3)
-    for _ in range(_ROUNDS):  # the scatter of a square is its mean
+def _variance_at(along: Array, ratio: Array, at: Array) -> Array:
+    """Variance at the forces ``at`` along the axis: a nonnegative quadratic in the squared force, fitted to ``ratio``."""
+    basis, fitted, sizes = _bernstein(along.ravel()), np.ones(along.size), np.ones(3)
+    for _ in range(_ROUNDS):  # reweighted, because a square scatters in proportion to its mean
         sizes = _nonnegative(basis / fitted[:, None], ratio.ravel() / fitted)
         fitted = np.maximum(basis @ sizes, _LEAST)
-    return np.maximum(_quadratic(at) @ sizes, _LEAST)
+    return np.maximum(_bernstein(at) @ sizes, _LEAST)
 
 
 def _nonnegative(columns: Array, target: Array) -> Array:
-    """Least-squares sizes (p,) of a few columns, none of them negative: the best of all subsets that have none."""
+    """Nonnegative least-squares coefficients (p,) of a few columns (m, p), by trying every subset."""
     gram, along = columns.T @ columns, columns.T @ target
     best, most = np.zeros(len(along)), 0.0
     for size in range(1, len(along) + 1):
@@ -160,7 +162,7 @@ def _nonnegative(columns: Array, target: Array) -> Array:
     return best
 
 
-def _quadratic(along: Array) -> Array:
-    """Bernstein's polynomials (..., 3) of the square of a force."""
+def _bernstein(along: Array) -> Array:
+    """Bernstein polynomials of second degree, (..., 3), in the square of a normalised force."""
     u = along**2
     return np.stack([(1.0 - u) ** 2, 2.0 * u * (1.0 - u), u**2], axis=-1)

@@ -1,8 +1,8 @@
-"""Likelihood ratio of a term beside a model, with the noise estimated again with the term included.
+"""Likelihood ratio of a term added to a model, with the noise estimated again with the term included.
 
-Before a term is in the model, part of it counts as noise, above all slow terms as random walk. So the covariance of the richer
-model is its own: D = −2[ℓ(V0; H) − ℓ(V1; H, C)], error contrasts of the model's columns H in both, the coefficients of C at
-their best, V1 the better of the model's and the richer one's noise.
+While a term is missing, part of it counts as noise; a slow term mostly as random walk. The richer model therefore has a
+covariance estimated for it: D = −2[ℓ(V0; H) − ℓ(V1; H, C)], with error contrasts of the model's columns H in both likelihoods,
+the coefficients of the term's columns C at their maximum, and V1 the better of the noises of the model and of the richer model.
 """
 
 from collections.abc import Callable
@@ -25,16 +25,16 @@ from inertial.probability import log_chi2_tail
 
 _FEWEST_POSES = 10
 _QUANTILES = (0.5, 0.75, 0.9)
-"""Of the poses, at which their scatter is compared with that of the noise: a table may be off in a part of its poses only."""
+"""Quantiles over the poses at which their scatter is compared with noise: a table may be inaccurate in some poses only."""
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """A term beside a model.
+    """The likelihood ratio of a term added to a model.
 
-    deviance : D, corrected for the noise that units share; rank : coefficients that the plan determines
-    price : of them, and of the locations searched; log_p : of the chi-square, one look
-    shared : φ with the term inside, by which the part common to all units is divided; again : the ratio with another φ
+    deviance : D, corrected for the noise that units share; rank : number of coefficients that the plan determines
+    price : penalty for these coefficients and for the locations searched; log_p : log probability of D under noise, one test
+    shared : φ of the model with the term, which divides the part of D common to all units; again : the ratio at another φ
     """
 
     deviance: float
@@ -45,7 +45,7 @@ class Ratio:
     again: Callable[[float], "Ratio"] | None = None
 
     def at(self, shared: float) -> "Ratio":
-        """The ratio at another φ: rivals are compared at a common φ, because the estimate of each scatters."""
+        """The ratio at another φ: rivals are compared at a common φ, because each estimate of φ scatters."""
         return self if self.again is None else self.again(shared)
 
     @property
@@ -55,7 +55,7 @@ class Ratio:
 
 
 def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
-    """The likelihood ratio of a term beside a model.
+    """The likelihood ratio of a term added to a model.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
     full = [_deviance(space, more) for space, more in spaces]
     best = int(np.argmin(full))
     space, more = spaces[best]
-    # the unknown state of a memory before the first dwell has coefficients, too
+    # includes the coefficients of the unknown state of a memory before the first dwell
     rank = more.local_rank + more.shared_rank - space.local_rank - space.shared_rank
     if rank <= 0 or not space.gain(term.candidate(model.problem)).rank[0]:
         return Ratio(0.0, 0, 0.0, 0.0)
@@ -82,26 +82,26 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
         ratio = weighed(deviance * (1.0 - along * (1.0 - 1.0 / by)), rank, nonlinear, locations)
         return replace(ratio, shared=shared, again=divided)
 
-    # by what the units share with the term inside: an effect common to all units is not noise
+    # φ with the term in the model: an effect common to all units must not count as shared noise
     return divided(shared_noise(richer))
 
 
 def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1) -> Ratio:
-    """A deviance with its price and its probability."""
+    """The ratio of a deviance with its price and its probability; ``nonlinear``: number of nonlinear parameters."""
     coefficients = rank + nonlinear
     paid = price(deviance, coefficients) + 2.0 * float(np.log(max(locations, 1)))
     return Ratio(deviance, rank, paid, float(log_chi2_tail(deviance, coefficients)))
 
 
 def _deviance(contrasts: Space, left: Space) -> float:
-    """−2 log likelihood of the error contrasts of one model, with what another leaves."""
+    """−2 log likelihood: error contrasts of the model of ``contrasts``, residual sums of squares of the model of ``left``."""
     return left.logdet + contrasts.information + deviance_of(left.squares, contrasts.by_block)
 
 
 def shared_noise(model: Model) -> float:
-    """φ: variance, over that of independent units, of the mean residual over the units; one for a single unit.
+    """φ: variance of the mean residual over the units, over its value for independent units; 1 for a single unit.
 
-    From the median: one wrong pose does not raise it.
+    It is estimated from the median of the squares, so that one wrong pose does not raise it.
     """
     lot = model.problem.lot
     units = lot.state.time.shape[0]
@@ -121,16 +121,16 @@ def shared_noise(model: Model) -> float:
 
 
 def of_station(term: Term) -> bool:
-    """Whether the coefficients of a term are those of the whole lot: of the station, or of what handling did to all units."""
+    """Whether a term has coefficients of the whole lot: of the station, or of a handling error of all units."""
     return term.shared and "unit" not in term.keywords
 
 
 def scatter_of_poses(model: Model) -> float:
-    """Variance of the directions of the poses, as all units see it, over that of the units' own noise; one at least.
+    """Variance of the pose directions common to all units, over that expected from the units' noise; at least 1.
 
-    Of each dwell by itself the two errors of its direction that all units share are fitted. Where a table comes to rest within
-    some microradians, their chi-square is larger than the noise of the units makes it, in many dwells; the quantiles over the
-    dwells are not raised by one wrong pose. What is said of the station has to stand out of this scatter.
+    The two direction errors that all units share are fitted to each dwell separately. Where a table comes to rest only within
+    some microradians, their chi-square exceeds that of the units' noise in many dwells; quantiles over the dwells are not raised
+    by one wrong pose. An effect of the station must exceed this scatter.
     """
     lot = model.problem.lot
     units, n = lot.state.time.shape
@@ -154,7 +154,7 @@ def scatter_of_poses(model: Model) -> float:
 
 
 def along_mean(model: Model, noise: Noise, term: Term) -> float:
-    """Share of the reduction by a term that is equal in all units, 0 … 1."""
+    """Share, 0 … 1, of the reduction of the sum of squares by a term that is common to all units."""
     lot = model.problem.lot
     units = lot.state.time.shape[0]
     if units < 2 or lot.radial:
@@ -174,9 +174,9 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
 
 
 def shared_factor(model: Model, term: Term) -> float:
-    """Factor, 1 at least, by which common noise widens the scatter of the separation of a term from its rivals.
+    """Factor, at least 1, by which noise common to the units raises the variance of a term's separation from its rivals.
 
-    One for an effect with different signs from unit to unit, up to the number of units for one that is equal in all.
+    It is 1 for an effect whose sign varies from unit to unit, and at most the number of units, for an effect equal in all.
 
     Parameters
     ----------
@@ -187,33 +187,33 @@ def shared_factor(model: Model, term: Term) -> float:
     if units < 2 or problem.lot.radial:
         return 1.0
     together = correlation_of_units(model)
-    return 1.0 + (units - 1) * together * (1.0 if term.shared else _alike(model, term, units))
+    return 1.0 + (units - 1) * together * (1.0 if term.shared else _correlation_of_term(model, term, units))
 
 
 def correlation_of_units(model: Model) -> float:
-    """Correlation of the residuals between units, on the same axis; zero if within chance, and for a single unit."""
+    """Correlation of the residuals of different units on the same axis; zero if not significant or for a single unit."""
     problem = model.problem
     units = problem.lot.state.time.shape[0]
     if units < 2 or problem.lot.radial:
         return 0.0
     left = np.nan_to_num(residuals(problem, model.terms, np.ones(problem.n, dtype=bool)) / problem.error)
-    correlation = _pairwise(left.reshape(units, -1))
+    correlation = _mean_correlation(left.reshape(units, -1))
     chance = 1.0 / np.sqrt(left.size / units * units * (units - 1) / 2.0)
     return correlation if correlation > UNITS_TOGETHER * chance else 0.0
 
 
-def _alike(model: Model, term: Term, units: int) -> float:
-    """Part of a term that is equal in every unit, 0 … 1."""
+def _correlation_of_term(model: Model, term: Term, units: int) -> float:
+    """Mean correlation, 0 … 1, of a fitted term between the units; 1 where the term has no coefficients by unit."""
     for other, columns in model.slices(shared=False):
         if other.effect.id == term.effect.id:
             series = np.einsum("bnp,bp->bn", other.columns(model.problem), estimate(model).local[:, columns])
             series = (series - series.mean(axis=1, keepdims=True)) / model.problem.error
-            return max(_pairwise(series.reshape(units, -1)), 0.0)
+            return max(_mean_correlation(series.reshape(units, -1)), 0.0)
     return 1.0
 
 
-def _pairwise(series: Array) -> float:
-    """Mean correlation between the rows (units, m), by their common size."""
+def _mean_correlation(series: Array) -> float:
+    """Mean correlation between the rows of ``series`` (units, m), normalised by their pooled sum of squares."""
     units = len(series)
     total = float(np.sum(series**2))
     return 0.0 if total <= 0.0 else (float(np.sum(series.sum(axis=0) ** 2)) / total - 1.0) / (units - 1)

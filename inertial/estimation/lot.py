@@ -1,4 +1,4 @@
-"""The measurements of a lot, as the diagnosis takes them."""
+"""The measurements of a lot: the input of the diagnosis."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,13 +14,13 @@ class Lot:
     """Measurements of a lot in g.
 
     state : the dwells of all units, (units, n)
-    output : (units, n, 3), output over the nominal scale: g
+    output : (units, n, 3), g, output divided by the nominal scale
     error : (units, n, 3), white standard error of each dwell mean, g; infinite where a dwell is missing
-    response : (units, 3, 3), K over its diagonal: how a change of force shows on each axis
-    radial : only the norm of the force is known; the state's force is then the corrected output's own direction
-    recorded : the white errors are from the scatter and number of samples, not from the residuals
-    scale : (units, 3), what the output of each axis was divided by; None where it is one for all
-    loudness : (n,), standard deviation of the noise of each dwell over the lot's; None where it is the same in all
+    response : (units, 3, 3), g/g, response matrix K over its diagonal: output of each axis per change of force
+    radial : whether only the norm of the force is known; the state's force is then the direction of the corrected output
+    recorded : whether the white errors come from the scatter and number of samples, not from the residuals
+    scale : (units, 3), nominal scale by which the output of each axis was divided; None where it is 1
+    loudness : (n,), standard deviation of the noise of each dwell over that of the lot; None where it is the same in all
     """
 
     state: State
@@ -34,7 +34,7 @@ class Lot:
 
     @property
     def measured(self) -> Flags:
-        """The dwells (n,) that any unit has on all axes."""
+        """Whether any unit has each dwell on all axes, (n,)."""
         return np.asarray(np.isfinite(self.error).all(axis=-1).any(axis=0))
 
     def units(self, index: Sequence[int]) -> "Lot":

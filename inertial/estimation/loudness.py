@@ -1,10 +1,10 @@
 """Noise that is louder in one soak than in another: most noise of a sensor grows with its temperature.
 
-A lot's covariance has one scale for every unit and axis, the same over the whole run. Where the noise of a hot soak is twice
-that of a cold one, nothing that looks like a step between two soaks, or a curve over temperature, has the significance that it
-seems to have. The scale of each soak is estimated before any effect is searched, from what a generous model of each soak by
-itself leaves: own bias, response and products of force in every soak take up effects of temperature and nonlinearity, and a
-robust scatter does not see single bad dwells. What all units do together at a dwell is taken off: a wrong pose is no noise.
+A lot's covariance has one scale for every unit and axis over the whole run. Where the noise of a hot soak is twice that of a
+cold one, the significance of a step between soaks, or of a curve over temperature, is overestimated. The scale of each soak is
+therefore estimated before any effect is searched, from the residuals of a flexible model fitted to each soak separately: bias,
+response and products of forces per soak absorb effects of temperature and nonlinearity, and a robust scatter ignores single bad
+dwells. The median over the units at each dwell is subtracted, because a wrong pose is not noise.
 """
 
 from itertools import combinations_with_replacement
@@ -22,25 +22,25 @@ _LEFT = 0.25
 """Share of the dwells of a soak that the model of a soak must leave as degrees of freedom."""
 
 TOGETHER = 4
-"""Units from which on their median at a dwell is what they do together."""
+"""Smallest number of units whose median at a dwell is subtracted as common to all units."""
 
 _DRIFTS = 16
-"""Dwells of a soak from which on a curved drift over it is taken off."""
+"""Smallest number of dwells of a soak in which a curved drift, not only a linear one, is fitted."""
 
 _FEWEST = 4
-"""Dwells of a soak from which on it has a scatter."""
+"""Smallest number of dwells of a soak whose scatter is estimated."""
 
 _DRAWN = 40_000
-"""Values of noise drawn for the mean of a soak's scatter: the logarithm of a few dwells' variance lies far below that of its
-mean, and by less where there are more, so that soaks of unequal length would differ without a reason."""
+"""Number of noise values drawn for the expected log variance of a soak: the mean log variance of few dwells lies far below the
+log of the mean variance, and less so for more dwells, so that soaks of unequal length would seem to differ."""
 
 
 def loudness_of(model: Model, soak: Places | None = None) -> Array | None:
-    """Standard deviation of the noise of each dwell over the lot's, (n,), mean square one; None where soaks do not differ.
+    """Standard deviation of the noise of each dwell over that of the lot, (n,), mean square 1; None if soaks do not differ.
 
     Parameters
     ----------
-    soak : (n,), number of the soak of each dwell, where the temperatures of the model are not those that tell it
+    soak : (n,), index of the soak of each dwell, where it must not be taken from the temperatures of the model
     """
     problem = model.problem
     if problem.lot.radial or problem.n > LONGEST or problem.lot.state.temperature is None:
@@ -66,7 +66,7 @@ def loudness_of(model: Model, soak: Places | None = None) -> Array | None:
 
 
 def _of_soak(model: Model, series: Array, dwells: Places) -> Array:
-    """Logarithm (blocks,) of the robust variance of a soak's residuals, less its mean for the model's noise; NaN if none."""
+    """Log robust variance (blocks,) of a soak's residuals, less its expectation for the model's noise; NaN if too few dwells."""
     problem, covariance = model.problem, model.problem.covariance
     there = covariance.there[:, dwells]
     force = np.broadcast_to(problem.lot.state.force, (*problem.lot.state.time.shape, 3))[:, dwells]
@@ -84,7 +84,7 @@ def _of_soak(model: Model, series: Array, dwells: Places) -> Array:
         here = force[block // problem.per_unit][present], time[block // problem.per_unit][present]
         if before is None or not all(map(np.array_equal, here, before)):
             # the axes of a unit, and units in the same poses at the same times, have the same columns
-            before, x = here, _columns(*here)
+            before, x = here, _soak_columns(*here)
             q = None if x is None else np.linalg.qr(x)[0]
             known.clear()
         if q is None:
@@ -112,17 +112,18 @@ def _of_soak(model: Model, series: Array, dwells: Places) -> Array:
 
 
 def inner_mean(left: Array) -> Array:
-    """Mean of the smaller three quarters of the squares of each row (..., n), NaN where missing: no single bad dwell is in it."""
+    """Mean (...,) of the smallest three quarters of the squares of each row (..., n), which excludes single bad dwells."""
     size = np.sort(np.where(np.isfinite(left), left, np.inf) ** 2, axis=-1)
     count = np.maximum((3 * np.isfinite(left).sum(axis=-1)) // 4, 1)
     inner = np.arange(size.shape[-1]) < count[..., None]
     return np.where(inner, size, 0.0).sum(axis=-1) / count
 
 
-def _columns(force: Array, time: Array) -> Array | None:
-    """Columns (k, p) of a soak: a drift, and products of force up to the largest degree that leaves enough; None where none does.
+def _soak_columns(force: Array, time: Array) -> Array | None:
+    """Orthonormal columns (k, p) of a soak: bias, drift, products of forces; None if too few degrees of freedom remain.
 
-    A device that had not soaked drifts over the soak: that is no noise.
+    The degree of the products is the largest, up to three, that leaves enough. A device that had not soaked drifts over the
+    soak, which is not noise.
     """
     best = None
     since = (time - time.min()) / max(float(np.ptp(time)), 1e-9)

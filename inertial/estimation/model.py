@@ -23,17 +23,17 @@ _LONG = 400
 
 
 _SHARE_OF_SCATTER = 0.5
-"""Part of the scatter of norms that their white noise has at the least, where that recorded in the samples is larger."""
+"""Lower bound of the white variance of norms, over their observed variance, where the recorded white noise is larger."""
 
 _CONTRADICTED = 0.025
-"""Probability of so little scatter of norms, below which the recorded noise is not that of the means."""
+"""Probability of an observed scatter of norms as small, below which the recorded noise is not that of the means."""
 
 
 _TURNS = 3
-"""Rounds in which blocks with shares of their own and the shares of the others are found in turn."""
+"""Rounds that alternate between the common shares and the shares of single blocks."""
 
 _OWN = 20
-"""Degrees of freedom of a block from which on its own variance is used for the shares; blocks with fewer have a common one."""
+"""Median degrees of freedom of a block from which on the shares are estimated with a free variance for every block."""
 
 
 class Model:
@@ -42,8 +42,8 @@ class Model:
     Parameters
     ----------
     near : noise at which the search for this model's noise starts
-    curves, shared_curves : (blocks, n, d), columns of a driver that is not an effect, sized by block or for all blocks
-    known : list that holds the noise of a model of these terms once it is found
+    curves, shared_curves : (blocks, n, d), columns of a driver that is not an effect, with coefficients by block or common to all
+    known : cache shared by models of the same terms: empty, or the one noise that was estimated
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class Model:
 
     @cached_property
     def shared(self) -> Array:
-        """Columns with coefficients of all blocks, (blocks, n, q)."""
+        """Columns whose coefficients all blocks share, (blocks, n, q)."""
         columns = [t.columns(self.problem) for t in self.terms if t.shared]
         if self._shared_curves is not None:
             columns.append(self._shared_curves)
@@ -86,13 +86,13 @@ class Model:
         return np.concatenate(columns, axis=-1)
 
     def slices(self, *, shared: bool) -> list[tuple[Term, slice]]:
-        """Terms whose coefficients all blocks share, or do not, and where their columns are; unknown states and curves follow."""
+        """The terms with shared or with local coefficients, and the slices of their columns; initial states and curves follow."""
         terms = [t for t in self.terms if t.shared == shared]
         ends = np.cumsum([0, *(t.columns(self.problem).shape[-1] for t in terms)]).tolist()
         return [(term, slice(start, end)) for term, start, end in zip(terms, ends[:-1], ends[1:], strict=True)]
 
     def at(self, noise: Noise) -> Space:
-        """The residuals of the model, whitened for a noise; the spaces of its own noise and of the last other one are stored."""
+        """The space of the model at a noise; those at the model's own noise and at the last other noise are stored."""
         if noise is self.__dict__.get("noise"):
             return self.space
         if self._last is None or self._last.noise is not noise:
@@ -104,14 +104,14 @@ class Model:
 
     @cached_property
     def noise(self) -> Noise:
-        """Shares of wander by restricted likelihood, pooled over the blocks, and variances of the blocks."""
+        """Noise by restricted likelihood: shares of wander pooled over the blocks, and the variance of each block."""
         if not self._found:
             self._found.append(self.noise_at(self._best_shares()))
             self._spaces.clear()
         return self._found[0]
 
     def _best_shares(self) -> Shares:
-        """Shares of the smallest restricted deviance; blocks whose wander is of another kind have their own."""
+        """Shares of smallest restricted deviance; blocks whose wander deviates clearly get shares of their own."""
         near = None if self._near is None else self._near.shares
         finest = 4 if self.problem.n > _LONG else 2
         best = best_shares(self._restricted, near, finest=finest)
@@ -121,12 +121,12 @@ class Model:
             by_block = own_shares(self.problem, series, self.local, space, self._by_products(best))
             if by_block == best.by_block:
                 break
-            # the others without them, from where they were
+            # the common shares again without these blocks, starting at the previous ones
             best = best_shares(self._restricted, best._replace(by_block=by_block), finest=finest)
         return best
 
     def forget(self) -> None:
-        """Drop what is stored for models that follow: for a large lot it takes much memory."""
+        """Drop stored spaces and products: in a large lot they take much memory."""
         self._spaces.clear()
         self._last = None
         for name in ("space", "_statistics", "_even"):
@@ -137,18 +137,19 @@ class Model:
         return plausible_shares(self._restricted, self.noise.shares)
 
     def noise_at(self, shares: Shares) -> Noise:
-        """The noise at given shares: each block's variance shrunk towards the others as far as they are similar."""
+        """The noise at given shares; each block's variance is shrunk towards those of the others as far as they agree."""
         space = self._rough(shares)
         squares, prior = moderated(space.squares, space.by_block)
         return Noise(shares, np.sqrt(np.maximum(squares, self._least)), prior)
 
     @cached_property
     def _least(self) -> Array:
-        """Variances (blocks,) over the recorded white ones below which those of a norm cannot be; zero where nothing is known.
+        """Lower bounds (blocks,) of the variances of norms, over the recorded white variances; zero where none is known.
 
-        White noise of the samples is a lower bound. Few dwells that fit well by chance otherwise pass for strong wander with less
-        white noise than their samples have, and errors are stated too small where the scatter is small by chance. A record that
-        scatters less than chance allows, as where a vibration averages out in its means, has a lower bound of its own.
+        The white noise of the samples is a lower bound. Without it, few dwells that agree by chance would be attributed to strong
+        wander with less white noise than the samples have, and errors stated where the scatter is small by chance would be too
+        small. A record that scatters less than chance allows, as where a vibration averages out in the means, has a lower bound
+        from its observed scatter.
         """
         lot = self.problem.lot
         if not (lot.radial and lot.recorded):
@@ -159,7 +160,7 @@ class Model:
         return np.where(contradicted, _SHARE_OF_SCATTER * space.squares / dof, 1.0)
 
     def _rough(self, shares: Shares) -> Space:
-        """The space at shares, with the blocks weighted by their known variances."""
+        """The space at given shares, with each block weighted by its approximate variance (:attr:`_weights`)."""
         if shares not in self._spaces:
             if len(self._spaces) >= (2 if self.problem.y.size <= LARGE else 1):  # a search for shares seldom goes back
                 del self._spaces[next(iter(self._spaces))]
@@ -168,17 +169,17 @@ class Model:
 
     @cached_property
     def _weights(self) -> Array:
-        """Standard deviations by which the blocks weigh while the shares are searched, (blocks,)."""
+        """Standard deviations (blocks,) by which the blocks are weighted while the shares are searched."""
         if self._near is not None:
             return self._near.scale
         if not self._joined:
             return np.ones(self.problem.blocks)
-        # the variances under white noise, for columns that all share
+        # with shared columns the blocks need relative weights: their variances under white noise
         space = self._space(self.problem.covariance.white_noise())
         return np.sqrt(moderated(space.squares, space.by_block)[0])
 
     def _restricted(self, shares: Shares) -> float:
-        """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
+        """−2 log restricted likelihood at given shares; each block has its own variance if the blocks have enough dwells."""
         known = self._known.of_lot.get(shares)
         if known is None:
             known, firm = self._deviance(shares)
@@ -187,16 +188,16 @@ class Model:
         return known
 
     def _deviance(self, shares: Shares) -> tuple[float, bool]:
-        """The deviance of :meth:`_restricted`, and whether it holds for all models of equal terms.
+        """The deviance of :meth:`_restricted`, and whether it may be stored for all models of equal terms.
 
-        By the products of the columns if these are precise, else in the whitened space.
+        It is computed from the products of the columns where these are precise, else in the whitened space.
         """
         quick = self._statistics.left(shares, self._weights)
         if quick is None:
             space = self._rough(shares)
             return self._deviance_of(shares, space.information, space.squares, space.by_block), False
         dof = self.problem.covariance.count - float(self._statistics.rank)
-        return self._deviance_of(shares, quick.information, quick.squares, dof), self._alike and quick.firm
+        return self._deviance_of(shares, quick.information, quick.squares, dof), self._terms_alone and quick.firm
 
     def _deviance_of(self, shares: Shares, information: float, squares: Array, dof: Array) -> float:
         logdet = float(np.sum(self.problem.covariance.logdet(shares)))
@@ -211,9 +212,9 @@ class Model:
         return logdet + information + float(np.sum(deviances))
 
     def _by_products(self, best: Shares) -> Callable[[int, Shares], float | None]:
-        """−2 log restricted likelihood of a block at shares, less the log-determinant; None if products are not precise enough.
+        """A function of block and shares: −2 log restricted likelihood of the block less its log-determinant.
 
-        What all blocks share has the coefficients that it has at the best shares.
+        It returns None where products are not precise enough. Shared columns keep their coefficients at the shares ``best``.
         """
         beside = self._statistics.left(best, self._weights) if self._joined else None
         if self._joined and beside is None:
@@ -225,7 +226,7 @@ class Model:
             if known is None and (left := self._statistics.left_of_block(block, shares, sizes)) is not None:
                 dof = int(self.problem.covariance.count[block]) - self._statistics.rank
                 known = left.information + dof * float(np.log(max(float(left.squares[0]), 1e-300)))
-                if self._alike and left.firm:
+                if self._terms_alone and left.firm:
                     self._known.of_blocks[block, shares] = known
             return known
 
@@ -233,20 +234,20 @@ class Model:
 
     @property
     def _joined(self) -> bool:
-        """Whether all blocks share some coefficients."""
+        """Whether the model has coefficients that all blocks share."""
         return self.shared.shape[-1] > 0
 
     @property
-    def _alike(self) -> bool:
-        """Whether the restricted likelihood depends on the terms alone: no weights, and no curve, are in it."""
+    def _terms_alone(self) -> bool:
+        """Whether the restricted likelihood depends on the terms alone, not on weights or curves."""
         return not self._joined and self._curves is None
 
     @cached_property
     def _known(self) -> KnownDeviances:
-        """The deviances that are known."""
+        """The store of deviances: common to all models of these terms in the problem where they depend on the terms alone."""
         return (
             self.problem.deviances.setdefault(frozenset(term.key for term in self.terms), KnownDeviances())
-            if self._alike
+            if self._terms_alone
             else KnownDeviances()
         )
 
@@ -261,10 +262,11 @@ class Model:
         return self._space(self.noise)
 
     def floor(self) -> float:
-        """RMS, g, that the noise of the measurement, white and wander, leaves in the residuals of least squares.
+        """RMS, g, of the least-squares residuals expected from the noise of the measurement, white and wander.
 
-        The residuals of a correct model have it; what of the noise looks like coefficients is in their uncertainty. A noise that
-        the shares describe badly (a beat with the mains is bounded, a random walk is not) is no more than the residuals hold.
+        The residuals of a correct model have this RMS; noise absorbed by the coefficients is in their uncertainty. Where the
+        shares describe the noise badly (a beat with the mains is bounded, a random walk is not), the value is limited to the RMS
+        of the residuals.
         """
         covariance, space = self.problem.covariance, self.even
         shared = space.targets[..., 1:]
@@ -275,9 +277,9 @@ class Model:
         return float(np.sqrt(max(min(left, held), 0.0) / max(int(covariance.count.sum()), 1)))
 
     def scatter(self) -> float:
-        """RMS of the noise of a dwell mean against its neighbours, g: white, and the wander from dwell to dwell.
+        """RMS, g, of the noise of a dwell mean relative to its neighbours: white noise, and wander from dwell to dwell.
 
-        Of a random walk :meth:`floor` has what it does over the whole record, this what it does between two dwells.
+        A random walk contributes its steps between dwells here, and its excursion over the record to :meth:`floor`.
         """
         covariance = self.problem.covariance
         wander = covariance.side_by_side(self.noise.shares)
@@ -285,14 +287,14 @@ class Model:
         return float(np.sqrt(np.sum(each * covariance.count) / max(int(covariance.count.sum()), 1)))
 
     def shared_sizes(self, term: Term) -> Array:
-        """Coefficients (k,) of a term that all blocks share."""
+        """Coefficients (k,), g per unit of its columns, of a term that all blocks share."""
         for other, columns in self.slices(shared=True):
-            if other.key == term.key:  # a model that was kept has an equal term
+            if other.key == term.key:  # a stored model may hold an equal term instead of this object
                 return self.space.shared_sizes[columns]
         raise KeyError(f"{term.effect.id}: not a term of the model")
 
     def explained(self, candidate: Candidate, floor: float) -> float:
-        """RMS, g, of the part of a candidate that the model cannot absorb, less that of noise of RMS ``floor``."""
+        """RMS, g, of the fitted part of a candidate beyond the model, less that expected from noise of RMS ``floor``."""
         covariance = self.problem.covariance
         gain = self.even.gain(candidate)
         if self.problem.y.size > LARGE:
@@ -302,7 +304,7 @@ class Model:
 
     @cached_property
     def even(self) -> Space:
-        """The space in which all blocks have equal weight: of the lot's white noise."""
+        """The space at the lot's mean white noise, in which all blocks have equal weight."""
         covariance = self.problem.covariance
         return self._space(Noise(Shares(), np.sqrt(covariance.white) / covariance.level))
 
@@ -313,7 +315,7 @@ class Model:
         shared_curves: Array | None = None,
         known: list[Noise] | None = None,
     ) -> "Model":
-        """Another model near this one; curves are kept unless others are given."""
+        """A model of other terms whose noise search starts at this model's noise; its curves unless others are given."""
         return Model(
             self.problem,
             terms,
@@ -324,15 +326,15 @@ class Model:
         )
 
     def with_term(self, term: Term) -> "Model":
-        """The model with one more term; its noise is kept, as a term is fitted, judged and sized one after the other."""
+        """The model with one more term; its noise is stored, because fit, test and size of a term all need it."""
         return self._variant([*self.terms, term], known=self._noises.setdefault(term.key, []))
 
     def with_curves(self, columns: Array) -> "Model":
-        """The model with the columns (blocks, n, d) of a driver, sized by block."""
+        """The model with the columns (blocks, n, d) of a driver, with coefficients by block."""
         return self._variant(self.terms, curves=columns)
 
     def held_at(self, shares: Shares) -> "Model":
-        """The model with the noise of given shares, as it is and not estimated."""
+        """The model at given shares of wander, which are not estimated."""
         curves, common = self._curves, self._shared_curves
         known = [self.noise_at(shares)]
         return Model(self.problem, self.terms, near=self._near, curves=curves, shared_curves=common, known=known)
@@ -342,16 +344,16 @@ class Model:
         return self._variant(self.terms, shared_curves=columns)
 
     def without(self, effect_id: str) -> "Model":
-        """The model less one effect."""
+        """The model without an effect, given by its id."""
         return self._variant([t for t in self.terms if t.effect.id != effect_id])
 
     def without_term(self, term: Term) -> "Model":
-        """The model less one term; a model that was kept holds an equal one."""
+        """The model without a term; terms are compared by their keys."""
         return self._variant([t for t in self.terms if t.key != term.key])
 
 
 def refuse_without_freedom(model: Model) -> None:
-    """Refuse to judge a model that has as many coefficients as there are measurements: it fits any data.
+    """Refuse to judge a model with as many coefficients as measurements: it fits any data.
 
     Raises
     ------

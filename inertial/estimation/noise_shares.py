@@ -1,4 +1,4 @@
-"""The noise of a lot: shares of 1/f and of random walk over the white variance, and the scale of every block.
+"""The noise of a lot: shares of 1/f noise and random walk relative to the white variance, and the scale of every block.
 
 Each block's variance comes from a scaled inverse chi-square distribution whose degrees of freedom and centre are estimated from
 the lot (Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3): equal units share one variance, a noisy unit keeps its own.
@@ -14,13 +14,13 @@ from inertial.arrays import Array
 from inertial.decisions import PRIOR_BETTER, PRIOR_DOF
 
 LONGEST = 1500
-"""Largest number of dwells with a model of wander: its covariance must fit into memory. Long runs are averaged before."""
+"""Largest number of dwells for which wander is modelled: its covariance must fit into memory. Long runs are averaged first."""
 
 
 class Shares(NamedTuple):
-    """Variances of 1/f and of random walk at the end of the record, over the lot's white variance.
+    """Variances of 1/f noise and of random walk at the end of the record, over the lot's white variance.
 
-    by_block : block, and its variances of 1/f and of random walk, for blocks whose wander is of another kind than the lot's
+    by_block : (index, 1/f, random walk) of each block with shares of its own instead of the lot's
     """
 
     flicker: float = 0.0
@@ -37,7 +37,7 @@ class Shares(NamedTuple):
         return next((Shares(flicker, walk) for number, flicker, walk in self.by_block if number == block), self.common)
 
     def pick(self, blocks: list[int]) -> "Shares":
-        """The shares of some blocks, numbered as they are given."""
+        """The shares of some blocks, renumbered in the given order."""
         if not self.by_block:
             return self
         rest_of = {block: rest for block, *rest in self.by_block}
@@ -45,7 +45,7 @@ class Shares(NamedTuple):
         return self._replace(by_block=tuple(of_picked))
 
     def times(self, flicker: float, walk: float) -> "Shares":
-        """Each share times a factor of its kind."""
+        """The shares with those of 1/f and of random walk multiplied by one factor each."""
         of_blocks = tuple((block, flicker * first, walk * second) for block, first, second in self.by_block)
         return Shares(flicker * self.flicker, walk * self.walk, of_blocks)
 
@@ -54,8 +54,8 @@ class Shares(NamedTuple):
 class Noise:
     """Noise of a lot.
 
-    scale : (blocks,), s: ratio of the standard deviations to those of the white errors and shares
-    prior : prior degrees of freedom of the blocks' variances; infinite if all are equal
+    scale : (blocks,), factor s on the standard deviations that white errors and shares state
+    prior : prior degrees of freedom of the blocks' variances; infinite if all variances are equal
     """
 
     shares: Shares
@@ -68,12 +68,12 @@ class Noise:
 
 
 def deviance_of(squares: Array, dof: Array) -> float:
-    """−2 log likelihood of blocks' sums of squares, at the best prior."""
+    """−2 log likelihood of the sums of squares (blocks,) with degrees of freedom (blocks,), at the best prior."""
     return min(float(np.min(_deviances(squares, dof)[0])), _deviance_of_equal(squares, dof)[0])
 
 
 def moderated(squares: Array, dof: Array) -> tuple[Array, float]:
-    """Variances (blocks,), and the prior degrees of freedom; one variance for all if that is not clearly worse.
+    """Variances (blocks,) and prior degrees of freedom; one common variance unless its likelihood is clearly lower.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def moderated(squares: Array, dof: Array) -> tuple[Array, float]:
 
 def _deviance_of_equal(squares: Array, dof: Array) -> tuple[float, float]:
     """−2 log likelihood of blocks of one variance, and that variance."""
-    # a sum of squares of a block that is fitted exactly can lie below zero by rounding
+    # rounding can make the sum of squares of an exactly fitted block negative
     total, sum_of_squares = float(np.sum(dof)), float(np.sum(np.maximum(squares, 0.0)))
     pooled = max(sum_of_squares / max(total, 1.0), 1e-300)
     return total * (np.log(2.0 * pooled) + 1.0), pooled

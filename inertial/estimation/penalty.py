@@ -1,4 +1,4 @@
-"""The price of an effect, and the probability of the same reduction by noise."""
+"""The price (penalty) of an effect's coefficients, and the probability that noise reduces the deviance as much."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from inertial.probability import log_f_tail
 
 PER_COEFFICIENT = 2.5
 PER_COLUMN = 6.0
-"""Price, in chi-square, for each coefficient and each column where whole models are compared, curves among them."""
+"""Price, in chi-square, of each coefficient and each column where complete models, also with curves, are compared."""
 
 
 def price(deviance: float, coefficients: float) -> float:
-    """Price of coefficients by their reduction D, in chi-square: k·(1 + ln(D/k)), and all of it where D is below k.
+    """Price of k coefficients that reduce the deviance by D, in chi-square: k·(1 + ln(D/k)), or D where D ≤ k.
 
-    Coefficients from a normal distribution whose variance is fitted to them: the evidence is the likelihood ratio less this.
+    For coefficients from a normal distribution of fitted variance, D less this price is twice the log evidence ratio.
     """
     if coefficients <= 0 or deviance <= coefficients:
         return max(deviance, 0.0)
@@ -25,7 +25,7 @@ def price(deviance: float, coefficients: float) -> float:
 
 
 def fall(space: Space, gain: Gain) -> np.ndarray:
-    """Reduction of the deviance (grid,) by a candidate at the noise of a space, with the variances estimated again."""
+    """Reduction of the deviance (grid,) by a candidate at the shares of a space, with the variances estimated again."""
     prior = space.noise.prior
     if np.isfinite(prior) and gain.by_block.any():
         degrees = (space.by_block + prior)[:, None]
@@ -35,7 +35,7 @@ def fall(space: Space, gain: Gain) -> np.ndarray:
 
 
 def log_p_value(space: Space, drop: float, rank: int) -> float:
-    """Natural logarithm of the probability of such a reduction by noise with this number of coefficients."""
+    """Log probability, by an F test, that noise reduces the sum of squares by ``drop`` with ``rank`` coefficients."""
     after = space.dof - rank
     if rank == 0 or after <= 0:
         return 0.0
@@ -44,7 +44,7 @@ def log_p_value(space: Space, drop: float, rank: int) -> float:
 
 
 def cost_of_model(model: Model) -> float:
-    """Penalised deviance of a whole model: the fewer coefficients and columns, the better."""
+    """Penalised deviance of a complete model, with prices for coefficients and columns; smaller is better."""
     space = model.space
     nonlinear = sum(freedom(t) for t in model.terms)
     columns = model.local.shape[-1] + model.shared.shape[-1]
@@ -56,15 +56,15 @@ def cost_of_model(model: Model) -> float:
 
 
 def of_few(count: int, coefficients: int) -> float:
-    """What a deviance falls by chance beyond its price where few measurements are left to many coefficients.
+    """Small-sample correction of the price of k coefficients with n measurements, in chi-square: 2k(k + 1)/(n − k − 1).
 
-    Hurvich and Tsai, Biometrika 76 (1989) 297: 2k(k + 1)/(n − k − 1).
+    Hurvich and Tsai, Biometrika 76 (1989) 297.
     """
     return 2.0 * coefficients * (coefficients + 1.0) / max(count - coefficients - 1, 1e-3)
 
 
 def freedom(term: Term) -> int:
-    """Number of nonlinear parameters estimated from the data: one, or three if each axis has its own."""
+    """Number of nonlinear parameters of a term estimated from the data; a parameter with a value per axis counts per axis."""
     if isinstance(term.effect, Handling) or not term.effect.nonlinear:
         return 0
     return sum(len(v) if isinstance(v, tuple) else 1 for v in term.keywords.values())

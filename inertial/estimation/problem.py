@@ -21,16 +21,16 @@ SHARED = ("station", "data")
 """Scopes of effects whose coefficients all blocks share."""
 
 _PIECE = 1_000_000
-"""Number of columns processed at a time."""
+"""Number of column elements processed at a time."""
 
 _WIDE = 3_000_000
-"""Number of elements of an effect's columns that are processed at a time: each pass also goes through the model's columns."""
+"""Number of elements of an effect's columns processed at a time; larger, because each pass also reads the model's columns."""
 
 _WIDEST = 3
 """Usual largest number of columns of an effect per axis."""
 
 _CACHE = 5_000_000
-"""Number of columns stored between passes; more are computed again, to limit the memory for large lots."""
+"""Number of column elements stored between passes; further ones are computed again, to limit memory in large lots."""
 
 
 Values = Mapping[str, float | tuple[float, ...]]
@@ -42,10 +42,10 @@ def on_axis(values: Values, axis: int) -> dict[str, float]:
     return {name: value[axis] if isinstance(value, tuple) else value for name, value in values.items()}
 
 
-def _of_axes(
+def _per_axis(
     effect: SensorEffect, values: Values, axes: Sequence[int], made: Callable[[int, dict[str, float]], Array]
 ) -> list[Array]:
-    """What is made for each sensor axis; the same for all where the effect depends on none, and its values neither."""
+    """Result of ``made(axis, values)`` for each axis; computed once where neither effect nor values depend on the axis."""
     if effect.same_on_axes and not any(isinstance(value, tuple) for value in values.values()):
         return [made(0, on_axis(values, 0))] * len(axes)
     return [made(axis, on_axis(values, axis)) for axis in axes]
@@ -53,9 +53,9 @@ def _of_axes(
 
 @dataclass(frozen=True)
 class KnownDeviances:
-    """Restricted deviances that the models of equal terms have in common, by the shares of the noise.
+    """Restricted deviances of all models of equal terms, by the shares of the noise.
 
-    of_lot : of all blocks; of_blocks : of single blocks, less the log-determinants
+    of_lot : of all blocks together; of_blocks : of single blocks, less their log-determinants
     """
 
     of_lot: dict[Shares, float] = field(default_factory=dict[Shares, float])
@@ -63,11 +63,11 @@ class KnownDeviances:
 
 
 class Problem:
-    """Series and columns of a lot by block.
+    """Measured series and effect columns of a lot by block.
 
     Parameters
     ----------
-    slope : (units, n, 3), g/K, known response of the outputs to temperature: the factor of an error of the thermometer
+    slope : (units, n, 3), g/K, known derivative of the outputs by temperature: the effect of a thermometer error per kelvin
     """
 
     def __init__(self, lot: Lot, *, slope: Array | None = None) -> None:
@@ -82,16 +82,16 @@ class Problem:
         self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
         self.deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
-        """What is known of models, by the keys of their terms."""
+        """Known deviances of models, by the keys of their terms."""
 
     @cached_property
     def covariance(self) -> Covariance:
-        """The covariances of the blocks, at any noise."""
+        """The noise covariances of the blocks."""
         time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, len(self.axes), axis=0)
         return Covariance(time, self.error, self._direction if self.lot.radial else None, self.lot.loudness)
 
     def forget(self) -> None:
-        """Drop the stored columns and products: they are made again where they are needed."""
+        """Drop the stored columns and products; they are computed again when needed."""
         self._store.clear()
         self._terms.clear()
         self._room = _CACHE
@@ -99,7 +99,7 @@ class Problem:
         self.lot.state.memory.clear()
 
     def _series(self) -> Array:
-        """Measurements (blocks, n), g: outputs, or the norm of the corrected output less 1 g."""
+        """Measurements (blocks, n), g: outputs, or the output along the corrected output's direction less 1 g."""
         if self.lot.radial:
             return np.einsum("unj,unj->un", self._direction, self.lot.output) - 1.0
         return np.swapaxes(self.lot.output, -1, -2).reshape(self.blocks, self.n)
@@ -131,7 +131,7 @@ class Problem:
         return int(np.isfinite(self.error).sum())
 
     def columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
-        """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
+        """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; a radial block has those of all axes."""
         key = (effect.id, *values.items())
         stored = self._terms.get(key)
         if stored is None:
@@ -147,7 +147,7 @@ class Problem:
         if isinstance(effect, SensorEffect):
             state = self.lot.state
             return self._by_axis(
-                _of_axes(
+                _per_axis(
                     effect,
                     values,
                     self.axes,
@@ -160,17 +160,16 @@ class Problem:
         """Columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
         if isinstance(effect, Handling) or not has_start(effect):
             return np.zeros((self.blocks, self.n, 0))
-        # a state that decays before the second dwell leaves a column of one dwell only: it is kept, and this dwell has no
-        # information
+        # a state that decays before the second dwell affects only the first; the column stays, so that dwell has no information
         state = self.lot.state
         if isinstance(effect, SensorEffect):
             return self._by_axis(
-                _of_axes(effect, values, self.axes, lambda axis, of_axis: effect.start_columns(state, axis, **of_axis))
+                _per_axis(effect, values, self.axes, lambda axis, of_axis: effect.start_columns(state, axis, **of_axis))
             )
         return self.seen(effect.start_change(state, **on_axis(values, 0)))
 
     def _by_axis(self, axes: list[Array]) -> Array:
-        """Columns of all axes, each (units or 1, n, p), by block."""
+        """Columns by block, (blocks, n, p), from those of each axis, (units or 1, n, p); radial: (units, n, axes · p)."""
         state = self.lot.state
         shape = state.time.shape
         if self.lot.radial:
@@ -183,7 +182,7 @@ class Problem:
         return joined.reshape(self.blocks, self.n, -1)
 
     def seen(self, change: Array) -> Array:
-        """Changes of force (units or 1, n, 3, q) as measured with every unit's response, by block."""
+        """Measured changes (blocks, n, q), g, for changes of force (units or 1, n, 3, q), g, with each unit's response."""
         state = self.lot.state
         seen = np.einsum(
             "uij,unjq->uinq", self.lot.response, np.broadcast_to(change, (*state.force.shape, change.shape[-1]))
@@ -194,17 +193,17 @@ class Problem:
         return of_axes(seen, self.axes, 1).reshape(self.blocks, self.n, -1)
 
     def candidate(self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
-        """Columns of an effect over values of its nonlinear parameters.
+        """The candidate of an effect at several values of its nonlinear parameters.
 
         Parameters
         ----------
-        first : how many columns an axis; all if None
+        first : number of leading columns per axis that are used; all if None
         """
         key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()), first)
         return self._stored(key, lambda: self.varied(effect, grid, first=first, key=key))
 
     def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
-        """A candidate, from the store or made; stored where its columns have room."""
+        """The stored candidate of a key, else a new one, which is stored if its columns fit into the cache."""
         candidate = self._store.get(key)
         if candidate is None:
             candidate = make()
@@ -215,7 +214,7 @@ class Problem:
 
     @property
     def at_a_time(self) -> int:
-        """Values of an effect's parameters whose columns are worked on together: few of a large lot, to limit the memory."""
+        """Number of parameter values whose columns are processed together; few in a large lot, to limit memory."""
         return max(1, _WIDE // (1 + self.blocks * self.n * _WIDEST))
 
     def varied(
@@ -227,12 +226,13 @@ class Problem:
         start: bool = False,
         key: object = None,
     ) -> Candidate:
-        """Columns of an effect over values, value after value; rows that blocks share are stored once.
+        """The candidate of an effect at several parameter values, not stored; rows that blocks share are held once.
 
         Parameters
         ----------
-        start : whether columns of the unknown state of a memory follow
-        key : under which the candidate is stored; None where it is tried once
+        first : number of leading columns per axis; all if None
+        start : whether columns of a memory's unknown initial state follow
+        key : key of stored products; None for a candidate that is tried once
         """
         shared = effect.scope in SHARED
         every: list[Array] = []
@@ -257,7 +257,7 @@ class Problem:
     def pieces(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None
     ) -> Iterator[Candidate]:
-        """The candidate of an effect in pieces of its grid, small enough to limit the memory for large lots."""
+        """Candidates of an effect for successive pieces of its grid, small enough to limit memory in large lots."""
         if isinstance(effect, Handling):
             yield from self._at_locations(effect, grid)
             return
@@ -270,12 +270,12 @@ class Problem:
                 size = max(1, _PIECE // made.columns[:, :, 0].size)
 
     def _at_locations(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
-        """Columns of an alternative at its locations, unit after unit, no more at a time than a piece has room for."""
+        """Candidates of a handling error for successive pieces of its locations, which are ordered by unit."""
         if grid and ("unit" not in grid[0] or "other" in grid[0]):
             alike = len(effect.change(self.lot, self.slope, **on_axis(grid[0], 0))) == 1
             size = max(1, _PIECE // ((len(self.axes) if alike else self.blocks) * self.n * _WIDEST))
             for start in range(0, len(grid), size):
-                yield self._together(effect, grid[start : start + size])
+                yield self._at_common_locations(effect, grid[start : start + size])
             return
         by_unit = [list(locations) for _, locations in groupby(grid, key=lambda values: values["unit"])]
         for locations, alike in groupby(by_unit, key=_without_unit):
@@ -284,7 +284,7 @@ class Problem:
             yield from self._of_units(effect, units, [dict(location) for location in locations], size)
 
     def _of_units(self, effect: Handling, units: Places, locations: Sequence[Values], size: int) -> Iterator[Candidate]:
-        """Columns of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
+        """Candidates of a one-unit error at equal locations in some units; at most ``size`` units each if columns differ."""
         key = (effect.id, units.size, int(units[0]), len(locations), *locations[0].items(), *locations[-1].items())
 
         def made() -> Candidate:
@@ -306,8 +306,8 @@ class Problem:
             blocks = blocks_of_units(some, len(self.axes))
             yield replace(candidate, columns=candidate.columns[blocks], units=some, key=(*key, start, size))
 
-    def _together(self, effect: Handling, locations: Sequence[Values]) -> Candidate:
-        """Columns of an alternative of the whole lot at some locations."""
+    def _at_common_locations(self, effect: Handling, locations: Sequence[Values]) -> Candidate:
+        """Candidate of a handling error at some locations, with coefficients that all blocks share."""
         key = (effect.id, len(locations), *locations[0].items(), *locations[-1].items())
 
         def made() -> Candidate:
@@ -322,5 +322,5 @@ class Problem:
 
 
 def _without_unit(locations: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:
-    """Locations in a unit as a key, without the unit."""
+    """A hashable key of locations without their unit: equal for units with the same locations."""
     return tuple(tuple((name, value) for name, value in location.items() if name != "unit") for location in locations)

@@ -1,6 +1,6 @@
-"""The residual of a true effect under a wrong one whose nonlinear parameters are fitted again: the minimum over their values.
+"""Residual of a true effect after the fit of a wrong one, minimised over the nonlinear parameters of the wrong one.
 
-Every value of the grid is tried, and values near the best, for each truth by itself; each sensor axis may have its own if that
+Every grid value and values near the best are tried, for each truth separately. Each sensor axis has its own values where that
 brings the reduction that the search requires (:data:`inertial.decisions.AXES_DIFFER`).
 """
 
@@ -25,21 +25,21 @@ from inertial.estimation.term import Term
 TermValues = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 _JITTER = 1e-8
-"""Part of a column, squared, below which a direction is rounding error, as in the fits."""
+"""Relative eigenvalue of the scaled Gram matrix below which a direction is rounding error, as in the fits."""
 
 _ROUNDS = 3
 _AXES = 3
 
 
 class LikelihoodProfile:
-    """Truths that a model does not have, and the part of them that a wrong effect cannot explain.
+    """True effects outside a model, and the part of each that a wrong effect cannot explain.
 
     Parameters
     ----------
     rest : the model without the rivals
-    targets : (blocks, n, r), contribution of each truth to the series, g
-    noise : of the whitening
-    by_axis : least reduction, in whitened squares, for which each axis has its own values; infinite for never
+    targets : (blocks, n, r), g, contribution of each of r truths to the series
+    noise : noise for the whitening
+    by_axis : smallest reduction of the whitened sum of squares for separate values per axis; infinite: never
     """
 
     def __init__(self, rest: Model, targets: Array, noise: Noise, by_axis: float = AXES_DIFFER) -> None:
@@ -55,7 +55,7 @@ class LikelihoodProfile:
     def whole(self) -> Array:
         """Whitened sum of squares (r,) of each truth after the model without any rival."""
         flat = self.targets.reshape(-1, self.targets.shape[-1])
-        return _after(self.shared.reshape(flat.shape[0], -1), flat)
+        return _fit_squares(self.shared.reshape(flat.shape[0], -1), flat)
 
     def left(self, wrong: Term, *, fine: bool) -> Array:
         """Whitened sum of squares (r,) of each truth after the model with a wrong effect.
@@ -73,19 +73,20 @@ class LikelihoodProfile:
             grid += [{**grid[0], **wrong.keywords}]
         varied = parameters if fine else []
         least = self._least(wrong, grid, varied, None)
-        if not parameters or self._over(wrong, grid)[1] is None:
+        if not parameters or self._residual_squares(wrong, grid)[1] is None:
             return least
         apart = np.sum([self._least(wrong, grid, varied, axis) for axis in range(_AXES)], axis=0)
         return np.where(least - apart > self.by_axis, apart, least)
 
     def _least(self, wrong: Term, grid: Sequence[Values], varied: Sequence[Nonlinear], axis: int | None) -> Array:
-        """Least sums of squares (r,) that a wrong effect leaves of the truths, over a grid, for all sensor axes or for one.
+        """Smallest residual sums of squares (r,) of the truths over a grid of the wrong effect.
 
         Parameters
         ----------
-        varied : parameters that are moved between those of the grid, one after the other
+        varied : parameters that are refined between grid values, one after the other
+        axis : sensor axis whose residuals count; None for all axes
         """
-        total, axes = self._over(wrong, grid)
+        total, axes = self._residual_squares(wrong, grid)
         squares = total if axis is None or axes is None else axes[axis]
         best, least = [grid[int(k)] for k in np.argmin(squares, axis=0)], squares.min(axis=0)
         truths = range(len(best))
@@ -97,7 +98,7 @@ class LikelihoodProfile:
                     for r in truths
                     for v in around(parameter, on_scale(parameter, _value(best[r], parameter, axis)), width)
                 ]
-                total, axes = self._over(wrong, tried)
+                total, axes = self._residual_squares(wrong, tried)
                 squares = total if axis is None or axes is None else axes[axis]
                 count = len(tried) // len(best)
                 for r in truths:
@@ -107,26 +108,26 @@ class LikelihoodProfile:
                 width *= 0.4
         return least
 
-    def _over(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
-        """Remaining sums of squares (g, r) at each set of values; by sensor axis (3, g, r) if blocks have own coefficients.
+    def _residual_squares(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
+        """Residual sums of squares (g, r) at each set of values; and by sensor axis, (3, g, r), if coefficients are by block.
 
-        What is left at a set of values is stored: truths and axes are often best at the same values, and a round begins where
-        the previous one ended.
+        Results are stored: truths and axes often have their minimum at the same values, and a round begins where the previous
+        one ended.
         """
         known = self._known.setdefault(wrong, {})
         names = [tuple(values.items()) for values in grid]
         new = [name for name in dict.fromkeys(names) if name not in known]
         if new:
-            total, axes = self._at(wrong, [dict(name) for name in new])
+            total, axes = self._computed_squares(wrong, [dict(name) for name in new])
             known.update({name: (total[k], None if axes is None else axes[:, k]) for k, name in enumerate(new)})
         by_axis = [of_axes for name in names if (of_axes := known[name][1]) is not None]
         return np.stack([known[name][0] for name in names]), np.stack(by_axis, axis=1) if by_axis else None
 
-    def _at(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
-        """Remaining sums of squares as of :meth:`_over`, computed."""
+    def _computed_squares(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
+        """The result of :meth:`_residual_squares`, computed."""
         candidate = self.problem.varied(wrong.effect, grid, first=wrong.first, start=True)
         if not wrong.shared:
-            return self._local(candidate)
+            return self._squares_after_local(candidate)
         columns = candidate.of_blocks
         blocks, n, g, p = columns.shape
         white = self.space.whiten(columns.reshape(blocks, n, g * p))
@@ -135,7 +136,7 @@ class LikelihoodProfile:
         flat = self.targets.reshape(blocks * n, -1)
         shared = self.shared.reshape(blocks * n, -1)
         squares = [
-            _after(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)
+            _fit_squares(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)
         ]
         return np.array(squares), None
 
@@ -148,8 +149,8 @@ class LikelihoodProfile:
     def _rows(self) -> Array:
         return self.space.backed(self._both)
 
-    def _local(self, candidate: Candidate) -> tuple[Array, Array | None]:
-        """Remaining sums of squares (g, r), and by axis (3, g, r), after columns with coefficients by block."""
+    def _squares_after_local(self, candidate: Candidate) -> tuple[Array, Array | None]:
+        """Residual sums of squares (g, r), and by axis (3, g, r), after a fit of columns with coefficients by block."""
         both = self._both
         r = self.targets.shape[-1]
         found = self.space.products(candidate)
@@ -181,8 +182,8 @@ def _value(values: Values, parameter: Nonlinear, axis: int | None) -> float:
     return value
 
 
-def _after(columns: Array, targets: Array) -> Array:
-    """Sums of squares (r,) of targets (m, r) after columns (m, p)."""
+def _fit_squares(columns: Array, targets: Array) -> Array:
+    """Residual sums of squares (r,) of targets (m, r) after a fit of columns (m, p)."""
     if columns.shape[1]:
         targets = targets - columns @ np.linalg.lstsq(columns, targets, rcond=1e-6)[0]
     return np.sum(targets**2, axis=0)

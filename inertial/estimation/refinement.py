@@ -1,4 +1,4 @@
-"""Nonlinear parameters of a term moved from the grid to the best fit."""
+"""Refinement of a term's nonlinear parameters from their grid values to the best fit."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,16 +18,16 @@ from inertial.estimation.term import Term
 from inertial.state import ALL_AXES
 
 _NEAR = 3
-"""Dwells on either side of a change of handling that are tried once more with all other terms in the model."""
+"""Dwells on either side of a handling error's first dwell that are tried again beside all other terms of the model."""
 
 _CLEARLY = 1.0
-"""Chi-square by which another of them must be better."""
+"""Chi-square by which another dwell must be better to replace the present one."""
 
 
 def refine(model: Model, term: Term, noise: Noise) -> Term:
-    """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
+    """The term with its nonlinear parameters at the best fit near their grid values; a handling error at its best dwell.
 
-    One value serves all units and axes, unless one per axis reduces the residual far more than noise can.
+    One value serves all units and axes, unless a value per axis reduces the residual far more than noise can.
     """
     space = model.at(noise)
     if isinstance(term.effect, Handling):
@@ -47,7 +47,7 @@ def refine(model: Model, term: Term, noise: Noise) -> Term:
 
 
 def _placed(space: Space, problem: Problem, term: Term) -> Term:
-    """An alternative at the best dwell near its own."""
+    """A handling error moved to the best dwell near its present one."""
     if not isinstance(term.effect, Handling):
         return term
     near = term.effect.near(problem.lot, **term.location)
@@ -59,7 +59,7 @@ def _placed(space: Space, problem: Problem, term: Term) -> Term:
 
 
 def better_placed(model: Model, term: Term) -> Term | None:
-    """A change of handling in a model at a dwell near its own that is clearly better; None if there is none."""
+    """A handling error of the model moved to a clearly better dwell nearby; None if there is none."""
     dwell = term.keywords.get("dwell")
     if not isinstance(term.effect, Handling) or not isinstance(dwell, float):
         return None
@@ -73,7 +73,7 @@ def better_placed(model: Model, term: Term) -> Term | None:
 
 
 def _between_choices(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
-    """The best of all values of a discrete parameter near its own: between the neighbouring choices of its grid."""
+    """The term with the best value of a discrete parameter between the grid values next to its present one."""
     value = float(np.mean(term.keywords[parameter.name]))
     values = parameter.between(value)
     while values.size:
@@ -89,7 +89,7 @@ def _between_choices(space: Space, problem: Problem, term: Term, parameter: Nonl
 
 
 def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
-    """Three rounds of five values, each round narrower, about the value that all axes share."""
+    """The term with one parameter refined for all axes: three rounds of five values, each round narrower."""
     centre, width = on_scale(parameter, float(np.mean(term.keywords[parameter.name]))), cell(parameter)
     for _ in range(3):
         values = around(parameter, centre, width)
@@ -106,7 +106,7 @@ def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) 
     values = np.repeat(parameter.grid()[:, None], 3, axis=1)
     width, best, taken = cell(parameter), values[0], np.zeros(3)
     for _ in range(4):
-        # a value of its own for each axis: one pass over the columns serves the three
+        # each set has one value per axis, so that one pass over the columns serves the three axes
         sets = [{**term.keywords, parameter.name: tuple(each)} for each in values.tolist()]
         by_block = _gain(space, problem, term, sets).by_block
         by_axis = by_block.reshape(-1, 3, len(values)).sum(axis=0)
@@ -120,7 +120,7 @@ def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) 
 
 
 def on_scale(parameter: Nonlinear, value: float) -> float:
-    """A value on the scale on which it is varied."""
+    """A parameter value on the scale (linear, logarithmic or reciprocal) on which it is varied."""
     return {"log": np.log, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
 
 
@@ -148,7 +148,7 @@ def _varied(space: Space, problem: Problem, term: Term, parameter: Nonlinear, va
 
 
 def _gain(space: Space, problem: Problem, term: Term, sets: Sequence[Values]) -> Gain:
-    """The gain of a term at several sets of values, with the unknown state of its memory; of a large lot not many at a time."""
+    """The gain of a term at several sets of values, with its unknown initial state; large lots are processed in parts."""
     size, start = problem.at_a_time, term.memory and not term.rest
     parts = [sets[first : first + size] for first in range(0, len(sets), size)]
     made = (problem.varied(term.effect, part, first=term.first, start=start) for part in parts)
@@ -165,7 +165,7 @@ def _beside(model: Model, terms: Sequence[Term], left_out: int) -> Model:
 
 
 def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
-    """Terms of a given model, with nonlinear parameters estimated effect by effect."""
+    """Terms of a model of given effects, with nonlinear parameters estimated for one effect after the other."""
     terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in effects]
     for index, effect in enumerate(effects):
         grid = grid_of(effect, problem.lot.state)
@@ -179,9 +179,9 @@ def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
 
 
 def replaced(model: Model) -> Model:
-    """A model with the discrete parameters of its effects at the best of their values beside all its other terms.
+    """The model with the discrete parameters of its effects at their best values beside all other terms.
 
-    Where dwells were left out, all instants of a step between them are equally good; with the dwells back one is best.
+    While dwells are left out, all instants of a step between their neighbours fit equally well; with the dwells, one is best.
     """
     terms = list(model.terms)
     for index, term in enumerate(model.terms):
@@ -197,11 +197,11 @@ def replaced(model: Model) -> Model:
 
 
 def settled(model: Model) -> Model:
-    """A model with the nonlinear parameters of its terms at the best fit beside all its other terms, at its own noise.
+    """The model with the continuous parameters of its terms at the best fit beside all other terms, at the model's noise.
 
-    A search places each parameter near its grid and at the noise without its term, which is larger: where the residual depends
-    on it weakly, the value would differ between a search and a fit of the resulting model. Parameters with one value per axis
-    are left as they are.
+    A search refines each parameter near its grid, at the larger noise without the term: where the residual depends on the
+    parameter weakly, its value would differ between a search and a fit of the resulting model. Parameters with one value per
+    axis are not changed.
     """
     terms = list(model.terms)
     for index, original in enumerate(model.terms):
@@ -214,10 +214,10 @@ def settled(model: Model) -> Model:
 
 
 def intervals(model: Model) -> dict[str, dict[str, tuple[float, float]]]:
-    """For each effect the 68 % interval of every continuous nonlinear parameter that all axes share, by its profile.
+    """Profile-likelihood 68 % intervals (low, high), by effect id and name, of the continuous parameters that all axes share.
 
-    Within it the sum of squares rises by less than one variance of the noise above its least value; an interval that ends at a
-    bound of the parameter is open there.
+    Within an interval the sum of squares is less than one noise variance above its minimum; an interval that ends at a bound of
+    the parameter is open there.
     """
     by_effect: dict[str, dict[str, tuple[float, float]]] = {}
     for index, term in enumerate(model.terms):
@@ -231,11 +231,11 @@ def intervals(model: Model) -> dict[str, dict[str, tuple[float, float]]]:
 
 
 _POINTS = 81
-"""Values over the range of a parameter at which its profile is computed; as many again around the best."""
+"""Number of values over the range of a parameter at which its profile is computed, and of further values around the best."""
 
 
 def _profile(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> tuple[Array, Array]:
-    """Values of a parameter over its range, denser around the best one, with that of the term; the reduction of χ² at each."""
+    """Values (m,) of a parameter over its range, denser around the best one, and the reduction of χ² (m,) at each."""
     low, high = sorted((on_scale(parameter, parameter.low), on_scale(parameter, parameter.high)))
     fitted = on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
     coarse = np.append(np.linspace(low, high, _POINTS), fitted)

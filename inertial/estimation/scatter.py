@@ -1,4 +1,4 @@
-"""Whether groups of measurements differ in scatter: one test for soaks, forces and the white noise of samples."""
+"""Test whether groups of measurements differ in scatter; used for soaks, classes of force and white noise of samples."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from inertial.distributions import f_tail
 
 
 def difference_p(sizes: Array) -> float:
-    """Probability of such differences between groups of equal scatter, by an F test of means over units and axes.
+    """Probability that groups of equal scatter differ as much, by an F test of their mean log variances over units and axes.
 
     Parameters
     ----------

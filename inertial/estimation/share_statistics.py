@@ -1,4 +1,4 @@
-"""What a model and its measurements say about the shares of the noise: products of its columns at any shares."""
+"""Restricted likelihood of the noise shares from products of a model's columns and measurements, without a whitened space."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,34 +13,34 @@ from inertial.estimation.noise_shares import Shares
 from inertial.estimation.problem import Problem
 
 VANISHING = 3e-5
-"""Singular value of columns of unit length, over the largest, below which a combination of them vanishes."""
+"""Relative singular value of unit-length columns below which a combination of them counts as zero."""
 
 _VANISHED = 1e-7
-"""The same of columns that all blocks share: the root of the smallest share of products that counts in a fit of them."""
+"""The same for columns that all blocks share: root of the smallest relative eigenvalue that a fit of them uses."""
 
 _ROUNDING = 1e-11
-"""Part of a column below which what a fit leaves of it is rounding."""
+"""Norm of a column after a fit, over its norm before, below which the remainder is rounding error."""
 
 _FAR = 1e3
-"""Multiple of the limit, of the squares, above which the eigenvalues of the products of columns decide on their rank."""
+"""Factor above the squared limit of singular values at which the eigenvalues of the Gram matrix suffice to decide the rank."""
 
 _HANGING = 1e-3
-"""Independent part of a column below which a single factorisation is inaccurate."""
+"""Diagonal of the Cholesky factor of unit-length columns below which the factorisation is inaccurate."""
 
 _FIRM = 1e4
-"""Largest inverse eigenvalue of the products of columns of unit length at which their order is of no account."""
+"""Largest inverse eigenvalue of the Gram matrix of unit-length columns at which the order of the columns does not matter."""
 
 _ABSORBED = 1e-8
-"""Share of the squares of a column that all blocks share below which products are too inaccurate for what is left of it."""
+"""Share of a shared column's sum of squares after the local columns, below which products are too inaccurate."""
 
 
 @dataclass(frozen=True)
 class Left:
-    """What columns with coefficients by block leave of measurements, beside those that all blocks share.
+    """Residuals of the measurements after a fit of local columns H (coefficients by block) and shared columns.
 
-    information : log|HᵀV⁻¹H| of the columns H with coefficients by block; squares : (blocks,), sums of squares
-    sizes : (q + 1,), what the columns that all blocks share, and the measurements, have in what is left; None if there are none
-    root : (blocks, r, r), lower factor of the products of the columns of unit length
+    information : log|HᵀV⁻¹H|; squares : (blocks,), whitened residual sums of squares
+    sizes : (q + 1,), weights of the shared columns and of the measurements in the residual; None without shared columns
+    root : (blocks, r, r), Cholesky factor, lower, of the Gram matrix of the unit-length local columns
     """
 
     information: float
@@ -50,9 +50,9 @@ class Left:
 
     @property
     def firm(self) -> bool:
-        """Whether another order of the same columns gives the same numbers: no combination of them nearly vanishes.
+        """Whether the result does not depend on the order of the columns, because no combination of them is nearly zero.
 
-        The smallest eigenvalue of the products is at least one over the sum of squares of the inverse factor.
+        The smallest eigenvalue of the Gram matrix is at least one over the sum of squares of the inverse factor.
         """
         if self.root is None:
             return False
@@ -60,12 +60,12 @@ class Left:
 
 
 class ShareStatistics:
-    """Products of the columns with coefficients by block, and of the measurements, with each other.
+    """Products, at any noise shares, of a model's columns and measurements with each other.
 
     Parameters
     ----------
-    local : (blocks, n, p), columns, g per unit of the coefficient
-    shared : (blocks, n, q), columns whose coefficients all blocks share
+    local : (blocks, n, p), g per unit of the coefficient, columns with coefficients by block
+    shared : (blocks, n, q), g per unit of the coefficient, columns whose coefficients all blocks share
     """
 
     def __init__(self, problem: Problem, local: Array, shared: Array) -> None:
@@ -75,20 +75,21 @@ class ShareStatistics:
 
     @property
     def rank(self) -> int:
-        """Number of columns with coefficients by block, without combinations that vanish."""
+        """Number of linearly independent local columns, as of :data:`VANISHING`."""
         return int(self._determined.shape[-1])
 
     @property
-    def _whole(self) -> bool:
-        """Whether no combination of the columns vanishes."""
+    def _independent(self) -> bool:
+        """Whether the local columns are linearly independent."""
         return self._determined is self._local
 
     @cached_property
     def _determined(self) -> Array:
-        """Columns (blocks, n, r) that span those with coefficients by block, without combinations that vanish.
+        """Linearly independent columns (blocks, n, r) with the span of the local ones; the local ones where ranks differ.
 
-        Of misalignment only three of six columns show in a norm, and a turn about one axis shows two of three forces. Counted
-        among the information, a combination that vanishes takes off ln F per share F of wander: the largest would always be best.
+        In a norm only three of six misalignment columns are visible, and rotation about one axis shows two of three forces.
+        Counted in the information, a zero combination would lower the deviance by ln F for a share F of wander: the largest
+        share would always be best.
         """
         there = self.problem.covariance.there.astype(np.float64)
         products = np.swapaxes(self._local, -1, -2) @ (self._local * there[..., None])
@@ -107,15 +108,15 @@ class ShareStatistics:
 
     @cached_property
     def _rows(self) -> Array:
-        """The columns by block, the directions of those that all share, and the measurements, as rows (blocks, r + q + 1, n).
+        """Independent local columns, directions of the shared ones, and measurements as rows (blocks, r + q + 1, n).
 
-        Of the measurements a plain fit is taken off before: what the model leaves of them is a millionth of their squares.
+        A fit of equal weights is subtracted from the measurements first: their residuals have a millionth of their squares.
         """
         y = self._after_plain_fit(self.problem.y[..., None])
         return np.swapaxes(np.concatenate([self._determined, self._directions, y], axis=-1), -1, -2)
 
     def _after_plain_fit(self, series: Array) -> Array:
-        """What the columns with coefficients by block leave of series (blocks, n, k) in a fit of equal weights."""
+        """Residuals of series (blocks, n, k) after a fit of the local columns with equal weights."""
         there = self.problem.covariance.there[..., None]
         unit = unit_columns(self._determined * there)[0]
         across = np.swapaxes(unit, -1, -2)
@@ -124,10 +125,7 @@ class ShareStatistics:
 
     @cached_property
     def _directions(self) -> Array:
-        """Orthonormal directions (blocks, n, r) that span the columns that all blocks share, without those that vanish.
-
-        A plain fit of the columns with coefficients by block is taken off before.
-        """
+        """Orthonormal basis (blocks, n, r) of the shared columns after a fit of the local ones, without directions of zero."""
         q = self._shared.shape[-1]
         if not q:
             return self._shared
@@ -139,7 +137,7 @@ class ShareStatistics:
 
     @cached_property
     def _distinct(self) -> tuple[Array, Places]:
-        """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + q + 1)."""
+        """The distinct rows of :attr:`_rows`, (m, n), and their index for each row of each block, (blocks, r + q + 1)."""
         blocks = self.problem.blocks
         few: list[Array] = []
         column_of: list[Places] = []
@@ -152,10 +150,10 @@ class ShareStatistics:
         return np.concatenate(few), np.stack(column_of, axis=1)
 
     def _products(self, shares: Shares) -> Array:
-        """Products (blocks, r + q + 1, r + q + 1) of the columns and the measurements with each other."""
+        """Products xᵀV⁻¹y (blocks, r + q + 1, r + q + 1) of all :attr:`_rows` with each other."""
         common = shares.common
         if common not in self._store:
-            self._store = {common: self._made(common)}  # the last alone: a search for shares seldom goes back
+            self._store = {common: self._made(common)}  # only the latest: a search for shares seldom goes back
         products = self._store[common]
         if shares.by_block:
             products = products.copy()
@@ -176,7 +174,7 @@ class ShareStatistics:
         return out
 
     def _of_block(self, block: int, shares: Shares) -> Array:
-        """The products of one block, at shares that are its own or the lot's."""
+        """The products of one block, (r + q + 1, r + q + 1), at given shares."""
         if shares in self._store:
             return self._store[shares][block]
         if (block, shares) not in self._single:
@@ -186,24 +184,24 @@ class ShareStatistics:
         return self._single[block, shares]
 
     def left(self, shares: Shares, scale: Array) -> Left | None:
-        """What is left of the measurements; None if columns are collinear.
+        """The residuals of the measurements; None if columns are nearly collinear.
 
         Parameters
         ----------
-        scale : (blocks,), standard deviations of the blocks, by which they weigh in the coefficients that all share
+        scale : (blocks,), standard deviations that weight the blocks in the estimate of shared coefficients
         """
         if not self._shared.shape[-1]:
             return _factorised(self._products(shares))
-        return _beside_common(self._products(shares), self.rank, scale) if self._whole else None
+        return _with_shared(self._products(shares), self.rank, scale) if self._independent else None
 
     def left_of_block(self, block: int, shares: Shares, sizes: Array | None = None) -> Left | None:
-        """What is left of the measurements of one block; None if columns are collinear.
+        """The residuals of one block; None if columns are nearly collinear.
 
         Parameters
         ----------
-        sizes : (q + 1,), what the columns that all blocks share, and the measurements, have in the series; None if there are none
+        sizes : (q + 1,), fixed weights of the shared columns and of the measurements in the series; None without shared columns
         """
-        if not self._whole:
+        if not self._independent:
             return None
         products = self._of_block(block, shares)
         if sizes is not None:
@@ -215,11 +213,11 @@ class ShareStatistics:
 
 
 def _factorised(products: Array) -> Left | None:
-    """What columns leave of measurements; None if columns are collinear.
+    """Residuals of the measurements after local columns; None if these are nearly collinear.
 
     Parameters
     ----------
-    products : (blocks, r + 1, r + 1), of the columns, and of the measurements, which are last
+    products : (blocks, r + 1, r + 1), Gram matrices of the columns and, last, the measurements
     """
     size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
     try:
@@ -234,14 +232,14 @@ def _factorised(products: Array) -> Left | None:
     return Left(information, squares, root=np.asarray(root[:, :-1, :-1], dtype=np.float64))
 
 
-def _beside_common(products: Array, rank: int, scale: Array) -> Left | None:
-    """As :func:`_factorised` where all blocks share the coefficients after the first ``rank``; ``scale`` as of ``left``."""
+def _with_shared(products: Array, rank: int, scale: Array) -> Left | None:
+    """As :func:`_factorised`, with shared columns after the first ``rank``; ``scale`` as in :meth:`ShareStatistics.left`."""
     size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
     unit = products / (size[:, :, None] * size[:, None, :])
     inner, across = unit[:, :rank, :rank], unit[:, :rank, rank:]
     values = np.linalg.eigvalsh(inner)
     if float(values[:, :1].min(initial=1.0)) < SEEN**2:
-        return None  # some are limited in what they count
+        return None  # the log-determinant of :func:`basis` limits such eigenvalues
     left = unit[:, rank:, rank:] - np.swapaxes(across, -1, -2) @ np.linalg.solve(inner, across)
     left *= size[:, rank:, None] * size[:, None, rank:]
     summed = np.sum(left / scale[:, None, None] ** 2, axis=0)

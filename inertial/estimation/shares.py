@@ -1,10 +1,10 @@
-"""The shares of 1/f and of random walk, searched on a lattice by restricted likelihood.
+"""The shares of 1/f noise and random walk, searched on a lattice by restricted likelihood.
 
-Shares of 1/f and of random walk are common to a lot, as equal sensors have equal noise. An axis that jumps between two levels,
-or wanders where the others only flicker, has whitened residuals that follow one another; with the shares of the lot its jumps
-are steps of many standard deviations, and a slow effect with a coefficient for every axis takes them up. Such a block gets
-shares of its own, by its own restricted likelihood, in every model that is judged: with an effect in the model that explains
-the block, its residuals no longer deviate, and the block has the lot's shares again.
+The shares are common to a lot, because equal sensors have equal noise. An axis that jumps between two levels, or has a random
+walk where the others only have 1/f noise, has autocorrelated whitened residuals; with the shares of the lot its jumps are steps
+of many standard deviations, which a slow effect with a coefficient for every axis absorbs. Such a block gets shares of its own,
+by its own restricted likelihood, in every model that is judged. With an effect in the model that explains the block, its
+residuals are no longer autocorrelated, and the block has the lot's shares again.
 """
 
 from collections.abc import Callable
@@ -20,18 +20,18 @@ from inertial.estimation.space import Space
 Point = tuple[int | None, int | None]
 
 _STRIDES = (4, 2, 1)
-"""Half decades, quarters, eighths."""
+"""Lattice steps of the successive searches: half, quarter and eighth of a decade."""
 
 _LEAST = 1e-3
 """Smallest reduction of the deviance by a step."""
 
 _RULED_OUT = 12.0
-"""Deviance above the least from which shares are ruled out: a weight of 0.25 %."""
+"""Deviance above the minimum from which shares are ruled out: a weight of 0.25 %."""
 
-_MOST_PLACES = 240
+_MOST_POINTS = 240
 
 FEWEST = 20
-"""Degrees of freedom of a block from which its own shares are estimated."""
+"""Smallest number of degrees of freedom of a block for an estimate of its own shares."""
 
 _LAGS = 3
 
@@ -65,10 +65,10 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
 
 
 def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[tuple[Shares, float]]:
-    """Shares by half decades about the best that a record does not rule out, with their weights, which add up to one.
+    """Shares at half decades around the best that a record does not rule out, with weights that add up to one.
 
-    The weights are the restricted likelihood: a flat density over the logarithms of the shares, where shares of zero count as one
-    half decade. Few dwells leave decades of shares open, and errors that are stated at the best alone are too small.
+    The weights are the restricted likelihood with a flat prior on the logarithms of the shares, where a share of zero counts as
+    one half decade. Few dwells leave decades of shares open, and errors stated at the best shares alone are too small.
     """
     stride = _STRIDES[0]
     middle = nearest_point(best)
@@ -76,10 +76,10 @@ def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[
     open_, least = [middle], known[middle]
     while open_:
         first, second = open_.pop()
-        near = [(k, second) for k in _beside(first, stride, middle[0])]
-        near += [(first, k) for k in _beside(second, stride, middle[1])]
+        near = [(k, second) for k in _adjacent(first, stride, middle[0])]
+        near += [(first, k) for k in _adjacent(second, stride, middle[1])]
         for point in near:
-            if point not in known and len(known) < _MOST_PLACES:
+            if point not in known and len(known) < _MOST_POINTS:
                 known[point] = deviance(shares_at(point, best.by_block))
                 if known[point] < least + _RULED_OUT:
                     least = min(least, known[point])
@@ -89,8 +89,8 @@ def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[
     return [(shares_at(point, best.by_block), float(weight / total)) for point, weight in weights.items()]
 
 
-def _beside(k: int | None, stride: int, middle: int | None) -> list[int | None]:
-    """Half decades up and down on the lattice through the best; below the least share there is none."""
+def _adjacent(k: int | None, stride: int, middle: int | None) -> list[int | None]:
+    """Lattice indices one stride below and above ``k`` on the lattice through ``middle``; None (no share) below the least."""
     least = LEAST_SHARE if middle is None else middle - stride * ((middle - LEAST_SHARE) // stride)
     if k is None:
         return [least]
@@ -107,7 +107,7 @@ def nearest_point(shares: Shares) -> Point:
 
 
 def shares_at(point: Point, by_block: tuple[tuple[int, float, float], ...] = ()) -> Shares:
-    """The shares at a point of the lattice, with those of blocks that have shares of their own."""
+    """The shares at a point of the lattice, together with given shares of single blocks."""
     flicker, walk = (0.0 if k is None else 10.0 ** (k / SHARE_STEP) for k in point)
     return Shares(flicker, walk, by_block)
 
@@ -117,7 +117,7 @@ def _inside(k: int) -> int:
 
 
 def _around(point: Point, stride: int) -> list[Point]:
-    """Neighbours: each share up or down, one for the other; at the first stride also none, or appearing."""
+    """Neighbours of a point: each share up or down, also both; at the first stride also a share removed or added."""
     first, second = point
     near: list[Point] = [*((first, k) for k in _moved(second, stride)), *((k, second) for k in _moved(first, stride))]
     if first is not None and second is not None:
@@ -142,19 +142,19 @@ def _moved(k: int | None, stride: int) -> list[int]:
 def own_shares(
     problem: Problem, series: Array, local: Array, space: Space, of_block: Callable[[int, Shares], float | None]
 ) -> tuple[tuple[int, float, float], ...]:
-    """Blocks with shares of their own, and their shares of 1/f and of walk, from the residuals of a model at the lot's shares.
+    """(index, 1/f, random walk) of each block that needs shares of its own, from a model's residuals at the lot's shares.
 
     Parameters
     ----------
-    series : (blocks, n), measurements less what columns that blocks share explain, g
-    local : (blocks, n, p), columns with coefficients by block
-    space : of the model at the lot's shares, or at shares some blocks of which are their own
-    of_block : −2 log restricted likelihood of a block at shares, less the log-determinant, where products give it; else None
+    series : (blocks, n), g, measurements less the fitted shared columns
+    local : (blocks, n, p), g per unit of the coefficient, columns with coefficients by block
+    space : space of the model at the lot's shares, possibly with own shares of some blocks
+    of_block : −2 log restricted likelihood of a block at given shares, less the log-determinant; None if not available
     """
     if problem.lot.radial or problem.n > LONGEST:
         return ()
     before = {block for block, _, _ in space.noise.shares.by_block}
-    suspect = before | set(np.flatnonzero(_follow(space) > OWN_SUSPECT).tolist())
+    suspect = before | set(np.flatnonzero(_box_pierce(space) > OWN_SUSPECT).tolist())
     dof = space.by_block
     common = space.noise.shares.common
     by_block: list[tuple[int, float, float]] = []
@@ -177,8 +177,8 @@ def own_shares(
     return tuple(by_block)
 
 
-def _follow(space: Space) -> Array:
-    """By how much the whitened residuals of each block follow one another: Box-Pierce over the first lags, χ² of as many."""
+def _box_pierce(space: Space) -> Array:
+    """Box-Pierce statistic (blocks,) of the whitened residuals over the first ``_LAGS`` lags; χ² with as many dof."""
     there = space.covariance.there
     left = np.where(there, space.residual, 0.0)
     squares = np.maximum(np.einsum("bn,bn->b", left, left), 1e-300)
@@ -188,7 +188,7 @@ def _follow(space: Space) -> Array:
 
 
 def _deviance_of_block(problem: Problem, block: int, columns: Array, shares: Shares) -> float:
-    """−2 log restricted likelihood of one block, its columns and behind them its measurements (n, p + 1), at shares."""
+    """−2 log restricted likelihood of one block at given shares; ``columns`` (n, p + 1): its columns, then its measurements."""
     covariance = problem.covariance
     there = covariance.there[block]
     whitener = covariance.whitener_of_block(block, shares)

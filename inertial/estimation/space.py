@@ -1,7 +1,7 @@
 """Residuals of a model and their reduction by a further effect: projections in the whitened space.
 
-Blocks are the series with their own coefficients: one per unit and axis. Columns shared by all blocks (the station's
-effects) are targets beside the measurements, so that adding a block's own column only updates a small Gram matrix.
+A block is the series of one unit and axis, with coefficients of its own (local columns). Columns shared by all blocks (effects
+of the station) are targets like the measurements, so that adding a local column only updates a small Gram matrix.
 """
 
 from collections.abc import Sequence
@@ -17,16 +17,16 @@ from inertial.estimation.covariance import Covariance
 from inertial.estimation.noise_shares import Noise
 
 _PIECE = 500_000
-"""Largest number of columns' values that are whitened at a time."""
+"""Largest number of column elements that are whitened at a time."""
 
 
 @dataclass(frozen=True)
 class Products:
     """Products of a candidate's columns in a whitened space, for each value of its nonlinear parameters.
 
-    whole : (b, grid, p, p), with each other
+    whole : (b, grid, p, p), with each other, before projection on the local columns
     along : (b, grid, p, r), with the orthonormal local columns of the model
-    inside : (b, grid, p, t), with the targets
+    inside : (b, grid, p, t), with the targets (measurements, then shared columns)
     """
 
     whole: Array
@@ -35,18 +35,18 @@ class Products:
 
     @property
     def left(self) -> Array:
-        """Products (b, grid, p, p) of the columns with each other after the local columns."""
+        """Products (b, grid, p, p) of the columns with each other after projection on the local columns."""
         return self.whole - self.along @ np.swapaxes(self.along, -1, -2)
 
     @property
     def squares(self) -> Array:
-        """Sums of squares (b, grid, p) of the columns before the local columns."""
+        """Sums of squares (b, grid, p) of the columns before projection on the local columns."""
         return np.diagonal(self.whole, axis1=-2, axis2=-1)
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Reduction of the sum of squares by a candidate, per value of its nonlinear parameters.
+    """Reduction of the whitened sum of squares by a candidate, for each value of its nonlinear parameters.
 
     drop : (grid,), reduction of the whitened sum of squares
     rank : (grid,), number of coefficients that the plan determines
@@ -70,13 +70,13 @@ class Gain:
 
 
 class Space:
-    """The measurements after a model, whitened for its noise: of variance one if the model is correct.
+    """The residuals of a model, whitened for its noise: of variance one if the model is correct.
 
     Parameters
     ----------
     y : (blocks, n), measurements, g
-    local : (blocks, n, p), columns with coefficients per block
-    shared : (blocks, n, q), columns with coefficients of all blocks
+    local : (blocks, n, p), g per unit of the coefficient, columns with coefficients per block
+    shared : (blocks, n, q), g per unit of the coefficient, columns whose coefficients all blocks share
     """
 
     def __init__(self, covariance: Covariance, noise: Noise, y: Array, local: Array, shared: Array) -> None:
@@ -87,7 +87,7 @@ class Space:
         self.q: Array = np.empty((blocks, n, p))
         self.targets: Array = np.empty((blocks, n, t))
         self.ranks, self._log_determinant = np.empty(blocks, dtype=np.intp), 0.0
-        # some blocks at a time: every step makes several arrays of the size of their columns
+        # in groups of blocks, because every step allocates several arrays of the size of their columns
         few = max(_PIECE // (n * (p + t)), 1)
         for some in np.split(np.arange(blocks), range(few, blocks, few)):
             columns = np.concatenate([y[some, :, None], shared[some], local[some]], axis=-1)
@@ -100,7 +100,7 @@ class Space:
         self.shared_rank = int(np.linalg.matrix_rank(self.gram[1:, 1:], tol=None)) if shared.shape[-1] else 0
 
     def whiten(self, columns: Array) -> Array:
-        """Columns (blocks, n, m) in this space."""
+        """Columns (blocks, n, m), g, whitened to noise of variance one."""
         return self.covariance.whiten(columns, self.noise.shares) / self.noise.scale[:, None, None]
 
     @property
@@ -110,7 +110,7 @@ class Space:
 
     @cached_property
     def rss(self) -> float:
-        """Whitened sum of squares after the model."""
+        """Whitened residual sum of squares of the model."""
         return schur(self.gram)
 
     @cached_property
@@ -120,12 +120,12 @@ class Space:
 
     @cached_property
     def by_block(self) -> Array:
-        """Degrees of freedom of each block, (blocks,)."""
+        """Residual degrees of freedom of each block, (blocks,)."""
         return np.maximum(self.covariance.count - self.ranks, 0).astype(np.float64)
 
     @cached_property
     def squares(self) -> Array:
-        """Sums of squares of each block over its white variance, (blocks,): the scale is not removed."""
+        """Residual sum of squares of each block over its stated white variance, (blocks,), not divided by the scale."""
         return np.einsum("bn,bn->b", self.residual, self.residual) * self.noise.scale**2
 
     @cached_property
@@ -135,7 +135,7 @@ class Space:
 
     @cached_property
     def logdet(self) -> float:
-        """Log-determinant of the covariance of all blocks, scales apart."""
+        """Log-determinant of the covariance of all blocks, without the scales."""
         return float(np.sum(self.covariance.logdet(self.noise.shares)))
 
     @cached_property
@@ -153,21 +153,21 @@ class Space:
 
     @property
     def information(self) -> float:
-        """log|HᵀV⁻¹H| of the local columns over all blocks, scales apart."""
+        """log|HᵀV⁻¹H| of the local columns over all blocks, without the scales."""
         return self._log_determinant + 2.0 * self._local.shape[-1] * float(np.sum(np.log(self.noise.scale)))
 
     @property
     def deleted(self) -> tuple[Array, Array]:
-        """(Py)_i and P_ii of every dwell, (blocks, n): deleted from its series, it deviates by their ratio, of variance 1/P_ii.
+        """(Py)_i in 1/g and P_ii in 1/g² of every dwell, (blocks, n), with P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹.
 
-        P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹.
+        The deletion residual of a dwell is (Py)_i/P_ii, with variance 1/P_ii.
         """
         back = self.backed(np.concatenate([self.residual[..., None], self.q], axis=-1))
         along = np.einsum("bkn,bkn->bn", back[:, 1:], back[:, 1:])
         return back[:, 0], np.maximum(self.covariance.precision(self.noise) - along, 0.0)
 
     def projector_at(self, block: int, dwell: int) -> Array:
-        """The column (n,) of P of one block at a dwell."""
+        """The column (n,), 1/g², of one block's P that belongs to a dwell."""
         at = np.zeros((1, self.q.shape[1], 1))
         at[0, dwell] = 1.0
         white = self.covariance.whiten(at, self.noise.shares, np.array([block])) / self.noise.scale[block]
@@ -176,27 +176,27 @@ class Space:
         return self.covariance.back(np.swapaxes(left, -1, -2), self.noise.shares, np.array([block]))[0, 0] / scale
 
     def project(self, columns: Array, blocks: Places | None = None) -> Array:
-        """Whitened columns (blocks, n, m) without the part that the local columns explain."""
+        """Whitened columns (blocks, n, m) after projection on the local columns: their residuals."""
         q = self.q if blocks is None else self.q[blocks]
         return columns - q @ (np.swapaxes(q, -1, -2) @ columns)
 
     def backed(self, white: Array) -> Array:
-        """Rows (blocks, k, n) that give the products of columns in g with whitened series (blocks, n, k)."""
+        """Rows (blocks, k, n), 1/g: their products with series in g are those of ``white`` (blocks, n, k) with whitened ones."""
         rows = self.covariance.back(np.swapaxes(white, -1, -2), self.noise.shares)
         rows /= (self.covariance.level * self.noise.scale)[:, None, None]
         return rows
 
     @cached_property
     def _rows(self) -> Array:
-        """The rows (blocks, r + t, n) of the orthonormal local columns and of the targets."""
+        """The result of :meth:`backed` for the orthonormal local columns and the targets, (blocks, r + t, n)."""
         return self.backed(np.concatenate([self.q, self.targets], axis=-1))
 
     def products(self, candidate: Candidate) -> Products:
-        """Products of a candidate's columns, no column of which is whitened for more than its own square.
+        """Products of a candidate's columns; only their squares need the whitened columns.
 
-        With the local columns Q and the targets t in the whitened space, QᵀWc and tᵀWc are rows times the columns in g, and
-        cᵀV⁻¹c depends on neither model nor measurements. What is visible after Q at all is more than 1e-4 of it: taking Q off the
-        products and not off the columns loses no digit that counts.
+        With the whitener W, local columns Q and targets t in the whitened space, QᵀWc and tᵀWc are precomputed rows times the
+        columns c in g, and cᵀV⁻¹c depends on neither model nor measurements. A visible column keeps more than 1e-4 of its square
+        after projection on Q, so that subtracting from the products instead of the columns loses no significant digit.
         """
         with_rows = times_rows(self._rows, candidate)
         local = self.q.shape[-1]
@@ -205,7 +205,7 @@ class Space:
         return Products(gram, with_rows[..., :local], with_rows[..., local:])
 
     def gain(self, candidate: Candidate) -> Gain:
-        """Gain of a candidate on the residuals."""
+        """Reduction of the residuals by a candidate."""
         found = self.products(candidate)
         if candidate.shared:
             return self._gain_shared(found, per_unit=None if candidate.units is None else candidate.per_unit)
@@ -216,21 +216,21 @@ class Space:
         return self._gain_along(along * inverse_roots(values, SEEN**2)[..., None], values > SEEN**2)
 
     def gain_of_dwells(self, columns: Array, dwells: Places) -> Gain:
-        """Gain of columns of one dwell each, for every dwell separately; all blocks share their coefficients.
+        """Gain of columns that change a single dwell, for each of some dwells; all blocks share the coefficients.
 
-        With P as in :mod:`inertial.criticism.left_out` a column t at dwell k has the product t²·P_kk with itself and t·(Py)_k
-        with the measurements: no column is whitened.
+        With P as in :attr:`deleted` a column of value t at dwell k has the product t²·P_kk with itself and t·(Py)_k with the
+        measurements: no column is whitened.
 
         Parameters
         ----------
-        columns : (blocks, n, p), of every dwell; dwells : (grid,)
+        columns : (blocks, n, p), g per unit of the coefficient, value of the columns at each dwell; dwells : (grid,), indices
         """
         n, p = columns.shape[1:]
         inside, left = np.zeros((n, p, self.targets.shape[-1])), np.zeros((n, p, p))
         size = np.zeros((n, p))
         for members, whitener in self.covariance.whiteners(self.noise.shares):
             scale = (self.covariance.level * self.noise.scale)[members, None]
-            # rows of Pᵀ from the left: the part that the local columns explain is subtracted
+            # P = Wᵀ(I − QQᵀ)W; the targets are projected already
             back = np.swapaxes(self.targets[members], -1, -2) @ whitener
             along = np.swapaxes(self.q[members], -1, -2) @ whitener
             precision = np.sum(whitener**2, axis=0) / scale**2
@@ -242,6 +242,7 @@ class Space:
         return self._solved((left / size[:, :, None] / size[:, None, :])[dwells], (inside / size[..., None])[dwells])
 
     def _gain_along(self, along: Array, seen: Flags) -> Gain:
+        """Gain of local columns from their orthonormal directions' products (b, grid, p, t) with the targets."""
         rank = seen.sum(axis=(0, 2))
         if self.targets.shape[-1] == 1:
             by_block = np.einsum("bgr,bgr->bg", along[..., 0], along[..., 0])
@@ -251,11 +252,11 @@ class Space:
         return Gain(drop, rank, self._by_block(along, left))
 
     def _by_block(self, along: Array, left: Array) -> Array:
-        """Reduction of each block's own sum of squares, (blocks, grid), with the shared coefficients estimated again.
+        """Reduction of each block's residual sum of squares, (blocks, grid), with the shared coefficients estimated again.
 
         Parameters
         ----------
-        along : (blocks, grid, r, t), the targets along the candidate; left : (grid, t, t), their products after it
+        along : (blocks, grid, r, t), projections of the targets on the candidate; left : (grid, t, t), their products after it
         """
         size = np.sqrt(np.maximum(np.diagonal(self.gram)[1:], 1e-300))
         inner = np.linalg.pinv(left[:, 1:, 1:] / np.outer(size, size), rcond=1e-8, hermitian=True)
@@ -267,7 +268,7 @@ class Space:
         return np.einsum("bn,bn->b", self.residual, self.residual)[:, None] - after
 
     def _gain_shared(self, found: Products, *, per_unit: int | None) -> Gain:
-        """Gain of columns whose coefficients all blocks share, or those of each unit: units in turn, all values of each."""
+        """Gain of columns with coefficients common to all blocks, or to each unit (grid: unit after unit, all values of each)."""
         together = per_unit or found.whole.shape[0]
         left, squares, inside = (
             each.reshape(-1, together, *each.shape[1:]).sum(axis=1).reshape(-1, *each.shape[2:])
@@ -277,7 +278,7 @@ class Space:
         return self._solved(left / (size[:, :, None] * size[:, None, :]), inside / size[..., None])
 
     def _solved(self, left: Array, inside: Array) -> Gain:
-        """Gain from products (grid, p, p) of common columns with each other and (grid, p, t) with the targets."""
+        """Gain of shared columns from their products (grid, p, p) with each other and (grid, p, t) with the targets."""
         along = inside[..., 0]
         if self.targets.shape[-1] > 1:
             inner = np.linalg.pinv(self.gram[1:, 1:], rcond=1e-10, hermitian=True)

@@ -17,9 +17,9 @@ from inertial.state import State
 class Term:
     """An effect in a model, at values of its nonlinear parameters.
 
-    values : of nonlinear parameters and constants; one value, or one per sensor axis
-    first : how many of its columns are used; None for all
-    rest : whether the state of its memory before the first dwell has no coefficients: it was at rest, or as a parameter says
+    values : names and values of nonlinear parameters and constants; one value, or one per sensor axis
+    first : number of leading columns that are used; None for all
+    rest : whether a memory's state before the first dwell is known (at rest, or given by a parameter) and has no coefficients
     """
 
     effect: AnyEffect | Handling
@@ -34,12 +34,12 @@ class Term:
 
     @property
     def memory(self) -> bool:
-        """Whether the effect depends on what was before the first dwell."""
+        """Whether the effect depends on the history before the first dwell."""
         return not isinstance(self.effect, Handling) and self.effect.memory
 
     @property
     def key(self) -> tuple[object, ...]:
-        """The term as a key; effects are known by their ids."""
+        """A hashable key of the term; the effect is identified by its id."""
         return self.effect.id, self.values, self.first, self.rest
 
     @property
@@ -68,7 +68,7 @@ class Term:
 
 
 class TurnOnBias(SensorEffect):
-    """Bias that differs from one power-on to the next: not an effect to search for, but one to allow for."""
+    """Turn-on bias: differs from one power-on to the next. It is never searched for, but always allowed for."""
 
     id = "turn_on_bias"
     symbol = "kP"
@@ -92,6 +92,6 @@ TURN_ON = Term(TurnOnBias())
 
 
 def with_turn_on(state: State, terms: Sequence[Term]) -> list[Term]:
-    """Terms, and the bias of every power-on beside them where the state has more than one."""
+    """The terms, with a turn-on bias added where the devices were switched on more than once."""
     named = any(t.effect.id == TURN_ON.effect.id for t in terms)
     return [*terms] if named or not switched(state) else [*terms, TURN_ON]

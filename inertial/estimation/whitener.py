@@ -1,4 +1,4 @@
-"""What makes the noise of one set of dwells white: a lower triangle by Cholesky factors, or one factor for each dwell."""
+"""Whitening transformations: an inverse Cholesky factor for noise with wander, a factor per dwell for white noise."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,15 @@ _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
 _times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
 
 EVEN = 1.5
-"""White standard errors of a block that differ by less than this factor are taken as equal."""
+"""White standard errors that differ by less than this factor are treated as equal."""
 
 
 @dataclass(frozen=True)
 class DwellProfile:
-    """Valid dwells, their times and white profile, common to the blocks of one whitener.
+    """Times of the dwells, which of them are valid, and their relative white noise, common to the blocks of a whitener.
 
-    loudness : (n,), by which all noise of a dwell is larger than the lot's; one where it is not known
+    time : (n,), s; there : (n,), whether a dwell is valid; direction : (n, 3), unit vectors of the force, for norms only
+    profile : (n,), white standard error over the block's typical one; loudness : (n,), standard deviation over the lot's, or 1
     """
 
     time: Array
@@ -34,7 +35,7 @@ class DwellProfile:
         return self.profile * self.loudness
 
     def louder(self, kernel: Array) -> Array:
-        """A covariance of wander (n, n), scaled by the loudness of the dwells."""
+        """A covariance of wander (n, n), scaled by the loudness of both dwells."""
         if not isinstance(self.loudness, np.ndarray):
             return kernel
         return kernel * (self.loudness[:, None] * self.loudness)
@@ -51,9 +52,9 @@ class DwellProfile:
 def grouped(
     time: Array, error: Array, direction: Array | None, level: Array, white: float, loudness: Array | None = None
 ) -> tuple[list[DwellProfile], list[tuple[int, int, Places]]]:
-    """Profiles of dwells that whiteners are made for, and groups of blocks that have a whitener in common.
+    """The distinct profiles of dwells, and the groups of blocks that share a whitener.
 
-    A group is the index of its profile, the steps of the lattice by which its shares are larger than the lot's, and its blocks.
+    A group is (index of its profile, lattice steps by which its shares exceed the lot's, indices of its blocks).
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def grouped(
             index = len(profiles)
             way = None if direction is None else direction[block]
             profiles.append(DwellProfile(time[block], there, profile, way, louder))
-        # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
+        # in quarter decades: levels within a factor of 1.3 share a whitener, the block's variance absorbs the difference
         steps = 2 * round(0.5 * SHARE_STEP * np.log10(white / level[block] ** 2))
         groups.setdefault((index, steps), []).append(block)
     return profiles, [(index, steps, np.array(blocks)) for (index, steps), blocks in groups.items()]
@@ -82,12 +83,12 @@ def grouped(
 
 @dataclass(frozen=True)
 class Whitener:
-    """What makes the noise of dwells white, of variance one over the block's level.
+    """Transformation that makes the noise of a block's dwells white, of variance one in units of the block's level squared.
 
-    there : (n,), the dwells that are not missing; the others become zero
-    white : (n,), factors of the dwells for white noise alone
-    logdet : log-determinant of the covariance of the dwells
-    lower : (n, n), lower triangle where the noise wanders; None where it is white
+    there : (n,), whether a dwell is present; missing dwells become zero
+    white : (n,), factor of each dwell for white noise alone
+    logdet : log-determinant of the covariance of the present dwells
+    lower : (n, n), lower-triangular matrix for noise with wander; None for white noise
     """
 
     there: Flags
@@ -106,29 +107,29 @@ class Whitener:
         return self.white**2 if self.lower is None else np.einsum("mn,mn->n", self.lower, self.lower)
 
     def rows(self, series: Array, *, overwrite: bool = False) -> Array:
-        """Series (..., n) with white noise; ``overwrite``: the result may be written over them."""
+        """Whitened series (..., n); with ``overwrite`` the input may be overwritten."""
         if self.lower is None:
             return np.multiply(series, self.white, out=series if overwrite else None)
-        # half of the products, as the matrix is triangular
+        # trmm needs half of the products of a full matrix
         flat = _flat(series)
         return _times(1.0, self.lower.T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=overwrite).T.reshape(
             series.shape
         )
 
     def columns(self, columns: Array) -> Array:
-        """Columns (b, n, m) with white noise."""
+        """Whitened columns (b, n, m)."""
         if self.lower is None:
             return columns * self.white[:, None]
         return np.swapaxes(self.rows(np.swapaxes(columns, -1, -2)), -1, -2)
 
     def back(self, series: Array) -> Array:
-        """Series (..., n) times the transpose of the whitener: their products with series in g are those of whitened ones."""
+        """Whitened series (..., n) times the whitener: products of the result with series in g are those in whitened space."""
         if self.lower is None:
             return series * self.white
         return _times(1.0, self.lower.T, _flat(series).T, side=0, lower=0).T.reshape(series.shape)
 
     def coloured(self, series: Array) -> Array:
-        """White series (..., n) with this noise; zero where a dwell is missing."""
+        """White series (..., n) transformed to this noise, the inverse of :meth:`rows`; zero where a dwell is missing."""
         if self.lower is None:
             return series * np.divide(1.0, self.white, out=np.zeros_like(self.white), where=self.there)
         out = np.zeros(series.shape)
@@ -140,17 +141,17 @@ class Whitener:
 
 
 def _flat(series: Array) -> Array:
-    """Series (..., n) as rows, (m, n)."""
+    """Series (..., n) as contiguous rows, (m, n)."""
     return np.ascontiguousarray(series).reshape(-1, series.shape[-1])
 
 
 def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Array, Array] | None) -> Whitener:
-    """The whitener of a block.
+    """The whitener of a profile of dwells.
 
     Parameters
     ----------
-    index : steps of the lattice at which the shares of 1/f and of random walk stand; None for none
-    wander : covariances (n, n) of 1/f and of random walk of variance one; None for records too long for them
+    index : lattice indices of the shares of 1/f noise and random walk; None for a share of zero
+    wander : covariances (n, n) of 1/f noise and random walk of variance one; None for records too long for them
     """
     there, complete = dwells.there, bool(dwells.there.all())
     white = np.where(there, 1.0 / dwells.white, 0.0)
@@ -163,7 +164,7 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
             covariance += 10.0 ** (i / SHARE_STEP) * dwells.louder(each)
     if not complete:
         covariance = covariance[np.ix_(there, there)]
-    # of the transpose, which is in Fortran order: no copy
+    # the transpose is in Fortran order, so that LAPACK needs no copy
     upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")

@@ -25,21 +25,21 @@ from inertial.next_measurement.separation import (
 from inertial.planning.sequences import SequenceStep, StationPace
 
 UNLUCKY = 1.65
-"""Standard deviations of chance against which the measurement must still separate."""
+"""Standard deviations by which chance may be unfavourable while the measurement still separates the rivals."""
 
 LEAST_WEIGHT = 0.02
 
 _SHOWN = 36.0
-"""Chi-square, a coefficient, at which an effect of typical size counts as seen: six standard errors."""
+"""Chi-square per coefficient at which an effect of typical size counts as visible: six standard errors."""
 
 
 @dataclass(frozen=True)
 class Promise:
     """Expected result of steps.
 
-    before, after : chi-square between the pair, the smaller for either being true; of a coefficient for unseen effects
-    ids : the best rival and the nearest that is separated from it; or the effects that become visible
-    if_true : chi-square expected between the two, by which of them is true
+    before, after : chi-square between two rivals, the smaller of the values if either is true; per coefficient of unseen effects
+    ids : the best rival and the nearest one that is separated from it; or the effects that become visible
+    if_true : id and expected chi-square between the two, for each of them being true
     remaining : rivals that are not separated from the best
     """
 
@@ -51,7 +51,7 @@ class Promise:
 
 
 Score = Callable[[Flags], Array]
-"""Gain of each step of a grid, (grid,), after the dwells that are marked."""
+"""Function of the measured dwells (n,), as flags, that gives the gain of each step of a grid, (grid,)."""
 
 
 class Objective(ABC):
@@ -59,8 +59,8 @@ class Objective(ABC):
 
     Parameters
     ----------
-    rivals : with a few units of what was measured
-    terms : the effects of the aim
+    rivals : the rivals, with the measurements of a few units
+    terms : the effects to separate or to show
     """
 
     least: ClassVar[float]
@@ -70,22 +70,22 @@ class Objective(ABC):
 
     @abstractmethod
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
-        """Share, 0 … 1, of the aim that is reached after these steps; ``fine`` for the stated gain, not for the search."""
+        """Share, 0 … 1, of the aim that is reached after these steps; ``fine``: accurate, as reported, instead of fast."""
 
     @abstractmethod
     def score(self, problem: Problem, grid: slice) -> Score:
-        """The gain of each step of a grid, whose dwells in a problem are given."""
+        """The :data:`Score` of steps whose dwells in ``problem`` are the slice ``grid``."""
 
     @abstractmethod
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
     ) -> Promise:
-        """The gain of ``steps``, measured after ``already``."""
+        """The expected result of ``steps`` measured after ``already``."""
 
     def picks(
         self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
     ) -> list[SequenceStep]:
-        """Steps of a grid, each the best after those before it are fitted."""
+        """Up to ``count`` steps of a grid, chosen one after the other, each the best when those before it are measured."""
         problem = widened(self.rivals, [*held, *grid], pace)
         n = problem.n - len(grid)
         score, train = self.score(problem, slice(n, None)), np.arange(problem.n) < n
@@ -100,29 +100,29 @@ class Objective(ABC):
 
 
 class RivalDiscrimination(Objective):
-    """Separation of rivals: for each truth, by its probability, every other rival must leave enough chi-square."""
+    """Separation of rivals: for each as the truth, weighted by its probability, every other must leave enough chi-square."""
 
     least = 0.03
 
     def __init__(self, rivals: Rivals, scores: Array, every: Rivals | None = None, never: Flags | None = None) -> None:
         super().__init__(rivals, rivals.terms)
         self.every = every or rivals
-        # (r, r): pairs that no measurement separates do not count
+        # (r, r): pairs that no measurement can separate are excluded
         self.never = np.eye(len(scores), dtype=bool) if never is None else never | np.eye(len(scores), dtype=bool)
         self.weight = np.maximum(np.exp(-0.5 * scores), LEAST_WEIGHT)
         self.needed = _needed(rivals, apart(rivals, fine=False))
         self._begun: dict[bool, Array] = {}
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
-        """Share of the required separations that is reached after these steps."""
+        """Weighted mean over pairs of rivals of the share of the required chi-square that is reached after these steps."""
         gap, needed = self.expected(steps, pace, fine=fine)
         open_pairs = self.weight[:, None] * ~self.never
         return float(np.sum(open_pairs * np.clip(gap / needed, 0.0, 1.0)) / max(float(np.sum(open_pairs)), 1e-12))
 
     def expected(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = True) -> tuple[Array, Array]:
-        """Chi-square (r, r) expected for the truth of a row against that of a column, and how much is needed.
+        """Expected and required chi-square, (r, r) each, for the rival of a row as the truth against that of a column.
 
-        For the present measurements the observed chi-square counts; new steps add their expected one.
+        The present measurements contribute their observed chi-square, new steps their expected one.
         """
         rivals = self.every if fine else self.rivals
         if fine not in self._begun:
@@ -133,7 +133,7 @@ class RivalDiscrimination(Objective):
         return rivals.observed + np.maximum(separation.left - self._begun[fine], 0.0), _needed(rivals, separation)
 
     def score(self, problem: Problem, grid: slice) -> Score:
-        """How much the rivals differ at each step after the dwells before are fitted."""
+        """The score of steps by how much the rivals' predictions differ after a fit to the measured dwells."""
         rivals = self.rivals
         truths = predictions(rivals, problem)
         rest = with_turn_on(problem.lot.state, rivals.rest)
@@ -177,7 +177,7 @@ class Sighting(Objective):
     least = 0.1
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
-        """Mean share over the effects of the required chi-square."""
+        """Mean over the effects of the share of the required chi-square."""
         return float(np.mean(np.minimum(self.shown(steps, pace) / _SHOWN, 1.0)))
 
     def shown(self, steps: Sequence[SequenceStep], pace: StationPace) -> Array:
@@ -192,7 +192,7 @@ class Sighting(Objective):
         return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
 
     def score(self, problem: Problem, grid: slice) -> Score:
-        """How large the effects beyond the model are at each step."""
+        """The score of steps by the size of the effects beyond the model."""
         rivals = self.rivals
         columns, _ = _typical(problem, self.terms)
         fit = Fitting(problem, with_turn_on(problem.lot.state, rivals.rest))
@@ -216,9 +216,9 @@ class Sighting(Objective):
 
 
 def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]:
-    """Columns of some effects at their typical size, (blocks, n, all), g, and how many each has.
+    """Columns of effects scaled to their typical size, (blocks, n, all), g, and the number of columns of each effect.
 
-    The size is the geometric mean of the usual range, at the largest excursion of the column.
+    The largest value of a column is the geometric mean of the effect's usual range.
     """
     scaled: list[Array] = []
     for term in terms:
@@ -231,14 +231,14 @@ def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]
 
 
 def _error(problem: Problem, rivals: Rivals) -> Array:
+    """White standard errors (blocks, n), g, at the fitted noise; infinite where a dwell is missing."""
     return np.where(np.isfinite(problem.error), problem.error * rivals.noise.scale[:, None], np.inf)
 
 
 def _needed(rivals: Rivals, separation: Apart) -> Array:
-    """Chi-square (r, r) between a truth (row) and a wrong rival (column) that removes the wrong one.
+    """Chi-square (r, r) that excludes a wrong rival (column) if the rival of the row is true.
 
-    The observed difference
-    scatters by twice its own root; a simpler rival has the lower price.
+    The observed difference has a standard deviation of twice its root; a simpler rival has the lower price.
     """
     counts = [_coefficients(rivals, t) for t in rivals.terms]
     paid = np.array([price(d, k) for d, k in zip(separation.whole, counts, strict=True)])
@@ -249,7 +249,7 @@ def _needed(rivals: Rivals, separation: Apart) -> Array:
 
 
 def _coefficients(rivals: Rivals, term: Term) -> float:
-    """Coefficients of a rival in the whole lot, the unknown state of its memory and nonlinear parameters among them."""
+    """Number of coefficients of a rival in the complete lot, including initial states of memories and nonlinear parameters."""
     problem = Problem(rivals.lot)
     columns = term.columns(problem).shape[-1] + term.start(problem).shape[-1]
     blocks = 1.0 if term.shared else problem.blocks * rivals.weight

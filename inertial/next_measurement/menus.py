@@ -1,7 +1,7 @@
-"""Possible next steps of a station: sequences of every kind that separates effects.
+"""Possible next steps of a station: sequences of every kind that can separate effects.
 
-Poses in new directions, at the temperatures of the run; waits of different length after a move; approaches from both sides;
-excursions of temperature up and down, soaked or read on the way; the same poses later; the devices switched off and on.
+These are poses in new directions, at the temperatures of the run; waits of different length after a move; approaches from both
+sides; temperature excursions up and down, soaked or during the ramp; the same poses later; and power cycles of the devices.
 """
 
 from collections.abc import Sequence
@@ -30,11 +30,11 @@ _STOPS = 8
 
 @dataclass(frozen=True)
 class TableReach:
-    """What the station may do.
+    """Capabilities and limits of a station.
 
-    outer, inner : rad, bounds of the table
-    temperature : °C, bounds for further soaks; None if the temperature is not changed
-    settle : s, the usual wait after a move
+    outer, inner : rad, bounds of the table angles
+    temperature : °C, bounds for further soaks; None if the temperature must not be changed
+    settle : s, usual wait after a move
     power : whether it can switch the devices off and on
     """
 
@@ -61,12 +61,12 @@ class StepSequence:
     steps: tuple[SequenceStep, ...]
 
     def times(self, repeats: int) -> "StepSequence":
-        """The sequence repeated so many times."""
+        """The sequence repeated ``repeats`` times."""
         return StepSequence(self.kind, self.steps * repeats)
 
 
 def reach_of(state: State) -> TableReach:
-    """The capabilities of the station that the run shows: its angles, and its temperatures if they varied."""
+    """The capabilities of a station that a run implies: any angle, its usual wait, and its temperature range if it varied."""
     settle = 2.0 if state.since_move is None else float(np.clip(np.median(state.since_move), 0.0, 60.0))
     if state.temperature is None or float(np.ptp(state.temperature)) < _VARIED_K:
         return TableReach(settle=settle)
@@ -76,9 +76,9 @@ def reach_of(state: State) -> TableReach:
 
 
 def pose_grid(reach: TableReach, temperature: float) -> list[SequenceStep]:
-    """Directions that respond to any curve of the force: a lattice, edges and corners, rings near 0.24, 0.5 and 0.75 g.
+    """Steps in directions that show any curve of the force: a lattice, edges and corners, rings near 0.1 to 0.75 g.
 
-    Two attitudes of the table give one direction of the force; both are included: the errors of the table differ.
+    Each direction is reached by two table attitudes; both are included, because the table errors differ.
     """
     rings = [_ring(axis, level) for axis in range(3) for level in (0.1, 0.24, 0.5, 0.75)]
     named = [poses.plan(name) for name in ("twenty_six", "orthogonal24")]
@@ -89,7 +89,7 @@ def pose_grid(reach: TableReach, temperature: float) -> list[SequenceStep]:
 
 
 def _ring(axis: int, level: float) -> Array:
-    """Angles in degrees of eight directions with ± ``level`` g on an axis."""
+    """Outer and inner angle, (8, 2), degrees, of directions with ± ``level`` g on an axis."""
     turn = 2.0 * np.pi * (np.arange(4) + 0.5 * (axis == 1)) / 4.0 + 0.3
     across = np.sqrt(1.0 - level**2)
     both = [
@@ -122,7 +122,7 @@ def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here:
 
     Parameters
     ----------
-    best : poses that separate the rivals by their directions; some are used if any pose is suitable
+    best : poses whose directions separate the rivals; the first two are used beside two faces
     here : °C, present temperature of the chamber
     """
     faces = [SequenceStep(0.0, 0.0, here, reach.settle), SequenceStep(np.pi, 0.0, here, reach.settle)]
@@ -143,7 +143,7 @@ def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here:
 
 
 def _waits(here: float) -> list[StepSequence]:
-    """Opposed poses in turn, with longer and longer waits after the move."""
+    """Opposite poses in turn, with increasing waits after the move, or repeated dwells in each pose."""
     pairs = (
         ((0.0, 0.0), (np.pi, 0.0)),
         ((0.5 * np.pi, 0.0), (-0.5 * np.pi, 0.0)),
@@ -154,13 +154,13 @@ def _waits(here: float) -> list[StepSequence]:
         for some in (pairs, pairs[:1]):
             steps = [SequenceStep(o, i, here, w) for w in waits for pair in some for o, i in pair]
             sequences.append(StepSequence("waits", tuple(steps)))
-    # dwell after dwell at one pose: the whole settling is measured
+    # repeated dwells in each pose record the complete settling
     stay = [SequenceStep(o, i, here, 0.0) for pair in pairs for o, i in pair for _ in range(8)]
     return [*sequences, StepSequence("waits", tuple(stay))]
 
 
 def _approaches(state: State, reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """Poses reached from both sides of each axis; the poses of the run in the opposite order."""
+    """Poses approached from both sides of each axis; the poses of the run in reverse order."""
     sequences: list[StepSequence] = []
     for count in (2, 4):
         steps: list[SequenceStep] = []
@@ -177,7 +177,7 @@ def _approaches(state: State, reach: TableReach, here: float, chosen: Sequence[S
 
 
 def _laters(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """Chosen steps again, once or several times, each after waiting."""
+    """Chosen steps repeated once or several times, each time after a wait."""
     sequences: list[StepSequence] = []
     for wait, times in ((120.0, 3), (600.0, 1), (600.0, 3), (1800.0, 1), (1800.0, 2)):
         group = [replace(chosen[0], wait=wait), *chosen[1:], chosen[0]]
@@ -186,7 +186,7 @@ def _laters(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
 
 
 def _power_cycles(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """A pose before and after the devices were off for a while, and again as they warm up, with another opposite to it."""
+    """Two opposite poses before and after the devices are off for a while, and again while they warm up."""
     first, second = chosen[0], chosen[1]
     sequences: list[StepSequence] = []
     for off, later in product((300.0, 600.0, 1800.0), ((), (60.0,), (60.0, 300.0), (60.0, 300.0, 900.0))):
@@ -198,7 +198,7 @@ def _power_cycles(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
 
 
 def _excursions(low: float, high: float, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """Soaks away from the present temperature and back, up and down, far and near."""
+    """Soaks at other temperatures and back at the present one, upwards and downwards, over large and small steps."""
     up, down = min(high, here + _EXCURSION_K), max(low, here - _EXCURSION_K)
     near_up, near_down = min(high, here + _MINOR_K), max(low, here - _MINOR_K)
     middle = 0.5 * (low + high)
@@ -215,7 +215,7 @@ def _excursions(low: float, high: float, here: float, chosen: Sequence[SequenceS
 
 
 def _between(state: State, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """Soaks half-way between those of the run, from the nearer end: only they show a curvature between two soaks."""
+    """Soaks between those of the run, from the nearer end on: only they show a curvature between two soaks."""
     soaks = np.array(sorted(levels(first_unit(state))))
     apart = np.flatnonzero(np.diff(soaks) > _VARIED_K)
     if apart.size < 1:
@@ -233,7 +233,7 @@ def _between(state: State, here: float, chosen: Sequence[SequenceStep]) -> list[
 
 
 def _ramps(low: float, high: float, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """Dwell after dwell while the devices follow the air, one way and back."""
+    """Dwells during a temperature ramp, while the devices follow the air, one way or also back."""
     sequences: list[StepSequence] = []
     for away, times in product((min(high, here + _EXCURSION_K), max(low, here - _EXCURSION_K)), (8, 20)):
         if abs(away - here) < 5.0:

@@ -24,14 +24,14 @@ MICRO = 1e6
 _MEMBERS = 6
 
 NOTHING = 1e-6
-"""Part of a truth, in chi-square, that an equivalent effect may leave under every step: rounding."""
+"""Largest share of a truth's chi-square that an equivalent effect leaves after every step, by rounding."""
 
 _EVERY, _FURTHER = 4, 12
 
 
 def rivals_in(model: Model, group: EffectClass, most: int = FEW) -> Rivals | None:
-    """The members of a class as rivals; None for a class of one, and without known angles."""
-    if len(group.members) < 2 or not _goes_on(model):
+    """The members of a class as rivals; None for a class of one member, or where the table angles are unknown."""
+    if len(group.members) < 2 or not _has_angles(model):
         return None
     others = [t for t in model.terms if t.effect.id not in group.ids]
     return rivals_of(model, [m.term for m in group.members[:_MEMBERS]], others, most)
@@ -40,11 +40,11 @@ def rivals_in(model: Model, group: EffectClass, most: int = FEW) -> Rivals | Non
 def proposal(
     model: Model, group: EffectClass, around: Circumstances | None = None, already: Sequence[SequenceStep] = ()
 ) -> Proposal | None:
-    """The steps that best separate the members of a class; None if no steps of the station are certain to separate two of them.
+    """The steps that best separate the members of a class; None if no steps of the station reliably separate two of them.
 
     Parameters
     ----------
-    already : steps already planned for another class; the proposal follows them
+    already : steps already planned for another class, after which the proposal is measured
     """
     rivals, every = rivals_in(model, group), rivals_in(model, group, MANY)
     if rivals is None or every is None:
@@ -55,7 +55,7 @@ def proposal(
         return None
     scores = np.array([m.score for m in group.members[:_MEMBERS]])
     proposed = ProposalSearch(RivalDiscrimination(rivals, scores, every, never), around, already).best()
-    # a measurement that may separate nothing is not worth its station time
+    # a measurement that might separate no rivals is not worth its station time
     return (
         None
         if proposed is None or len(proposed.remaining) == len(rivals.terms) - 1
@@ -64,7 +64,7 @@ def proposal(
 
 
 def twins(model: Model, group: EffectClass, around: Circumstances | None = None) -> tuple[str, ...]:
-    """The best member of a class and those that no measurement of the station separates from it; empty if there are none."""
+    """Ids of the best member of a class and of those that no measurement of the station separates from it; else empty."""
     rivals = rivals_in(model, group)
     if rivals is None:
         return ()
@@ -76,11 +76,8 @@ def twins(model: Model, group: EffectClass, around: Circumstances | None = None)
 def sighting(
     model: Model, unseen: Sequence[str], around: Circumstances | None = None, already: Sequence[SequenceStep] = ()
 ) -> Proposal | None:
-    """The steps that best show unseen effects; None if none matters, or the station can show none.
-
-    An effect matters if its usual size exceeds the noise.
-    """
-    if not _goes_on(model):
+    """The steps that best show unseen effects; None if none can exceed the noise, or if the station can show none."""
+    if not _has_angles(model):
         return None
     floor = MICRO * model.floor()
     around = around or Circumstances()
@@ -95,14 +92,14 @@ def sighting(
     return None if proposed is None else replace(proposed, pair=())
 
 
-def _goes_on(model: Model) -> bool:
-    """Whether the angles of the table are known."""
+def _has_angles(model: Model) -> bool:
+    """Whether the table angles are known, as for every proposal."""
     state = model.problem.lot.state
     return state.outer is not None and state.inner is not None and not model.problem.lot.radial
 
 
 def _term(model: Model, name: str) -> Term | None:
-    """An effect at the middle of its grid; None if the dwells lack a quantity."""
+    """The term of an effect at the middle of its grid; None if a required quantity was not recorded."""
     effect, state = catalogue.get(name), model.problem.lot.state
     try:
         grid = resting_grid(effect, state)
@@ -112,7 +109,7 @@ def _term(model: Model, name: str) -> Term | None:
     return Term(effect, tuple(grid[len(grid) // 2].items()))
 
 
-def _everything(state: State, reach: TableReach, pace: StationPace) -> list[SequenceStep]:
+def _all_kinds_of_steps(state: State, reach: TableReach, pace: StationPace) -> list[SequenceStep]:
     """Steps of every kind that a station can take: directions, temperatures, waits, approaches, ramps, power."""
     here = present(state, pace)
     poses = pose_grid(reach, here)
@@ -128,9 +125,9 @@ def _everything(state: State, reach: TableReach, pace: StationPace) -> list[Sequ
 
 
 def _never_apart(rivals: Rivals, around: Circumstances) -> Flags:
-    """Whether (r, r) the rival of a column explains the prediction of the rival of a row, under every step of the station."""
+    """Flags (r, r): whether the rival of a column explains the prediction of that of a row under every step of the station."""
     state = rivals.lot.state
-    steps = _everything(state, around.reach or reach_of(state), around.pace)
+    steps = _all_kinds_of_steps(state, around.reach or reach_of(state), around.pace)
     if not steps:
         return ~np.eye(len(rivals.terms), dtype=bool)
     separation = apart(rivals, steps, around.pace)

@@ -1,8 +1,8 @@
-"""Separation of rivals by measurements: the chi-square that the wrong one leaves, before and after planned steps.
+"""Separation of rivals by measurements: the chi-square that a wrong rival leaves, before and after planned steps.
 
-Every rival is assumed as the truth once, with its fitted coefficients and nonlinear parameters; every other one, with the rest
-of the model, is fitted to what it predicts. The residual, whitened for white noise and wander, is the noncentrality of the
-test between the two (Atkinson & Fedorov, Biometrika 62 (1975) 57: T-optimal designs maximise the smallest of these).
+Each rival in turn is assumed true, with its fitted coefficients and nonlinear parameters; every other one, with the rest of the
+model, is fitted to its prediction. The sum of squares of the residuals, whitened for white noise and wander, is the noncentrality
+of the test between the two (Atkinson & Fedorov, Biometrika 62 (1975) 57: T-optimal designs maximise the smallest of these).
 """
 
 from collections.abc import Sequence
@@ -27,18 +27,18 @@ from inertial.estimation.term import Term, with_turn_on
 from inertial.planning.sequences import SequenceStep, StationPace, extended
 
 FEW, MANY = 3, 16
-"""Units that stand for the lot, as all have the same steps: during the search, and for the expected result."""
+"""Number of units that represent the lot, in which all have the same steps: for the search, and for the expected result."""
 
 
 @dataclass(frozen=True)
 class Rivals:
-    """Effects that measurements do not separate, with their fits.
+    """Effects that the present measurements do not separate, with their fits.
 
-    lot : a few units of it; weight : units of the whole lot over these
-    rest : the terms of the model beside the rivals
-    predicted : per rival, its coefficients (blocks, p) or (p,) for a station's effect
-    noise : of the few units; variance : enlarged by noise that units share
-    covariance : the unit of the noise's shares
+    lot : a few units of the lot; weight : number of units of the complete lot over that of these
+    rest : the terms of the model beside the rivals; terms : the rivals, best first
+    predicted : coefficients of each rival, (blocks, p), or (p,) for an effect of the station
+    noise : noise of the few units; variance : whitened residual variance, enlarged for noise that the units share
+    covariance : covariance whose white variance and duration are the unit of the noise's shares
     observed : (r, r), chi-square of the present measurements in favour of the rival of a row over that of a column
     """
 
@@ -64,23 +64,21 @@ class Rivals:
 
 
 def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most: int = FEW) -> Rivals:
-    """Rivals with the coefficients that a fit beside the rest of the model gives each of them.
+    """Rivals with coefficients fitted to each of them beside the rest of the model.
 
     Parameters
     ----------
-    model : with all identified effects, for the noise
+    model : model with all identified effects, for the noise
     terms : the rivals
     others : the terms of the model beside them
-    most : units that stand for the lot
+    most : largest number of units that represent the lot
     """
     units = model.problem.lot.state.time.shape[0]
     pick = np.unique(np.linspace(0, units - 1, min(units, most)).round().astype(int)).tolist()
     blocks = pick if model.problem.lot.radial else blocks_of_units(np.array(pick), model.problem.per_unit).tolist()
-    # what memories held before the run is not known, whatever explains the run at the least price
+    # initial states of memories are free here, even if the search found the run explained without them
     terms, others = ([replace(t, rest=False) for t in each] for each in (terms, others))
-    others = [
-        t for t in others if not isinstance(t.effect, Handling)
-    ]  # of single units, and no step to come changes them
+    others = [t for t in others if not isinstance(t.effect, Handling)]  # errors of this run do not affect later steps
     fitted = [Model(model.problem, [t, *others], near=model.noise) for t in terms]
     predicted = tuple(_coefficients(m, t, blocks) for m, t in zip(fitted, terms, strict=True))
     squares = np.array([m.at(model.noise).rss for m in fitted])
@@ -100,7 +98,7 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most:
 
 
 def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
-    """Coefficients of the first term of a model: of some blocks, or shared."""
+    """Coefficients of the first term of a model: (blocks, p) of some blocks, or (p,) shared ones."""
     fit = estimate(model)
     columns = term.columns(model.problem).shape[-1]
     return fit.shared[:columns] if term.shared else fit.local[list(blocks), :columns]
@@ -110,8 +108,8 @@ def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
 class Apart:
     """The separation of rivals.
 
-    left : (r, r), chi-square over the whole lot that the rival of a column leaves of what the rival of a row predicts
-    whole : (r,), what the model without any of them leaves
+    left : (r, r), chi-square over the complete lot of the row rival's prediction after a fit of the column rival
+    whole : (r,), chi-square of each rival's prediction after a fit of the model without any rival
     """
 
     left: Array
@@ -121,12 +119,12 @@ class Apart:
 def apart(
     rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
 ) -> Apart:
-    """The separation of rivals, each fitted to what each other one predicts.
+    """The separation of rivals, each fitted to the prediction of every other one.
 
     Parameters
     ----------
-    steps : after the present measurements; none for the separation by the present measurements
-    fine : whether the wrong rival's nonlinear parameters are fitted, or only the best of their grid is used
+    steps : steps measured after the present dwells; none: separation by the present measurements
+    fine : whether the wrong rival's nonlinear parameters are fitted between the grid values
     """
     problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
     noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
@@ -163,7 +161,7 @@ def predictions(rivals: Rivals, problem: Problem) -> Array:
 
 
 def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | None) -> Problem:
-    """The problem with steps taken after its dwells; their readings are not used."""
+    """The problem of the rivals' lot with further steps after its dwells, whose outputs are not used."""
     lot = rivals.lot
     units = lot.state.time.shape[0]
     state = extended(lot.state, steps, pace, response=lot.response)

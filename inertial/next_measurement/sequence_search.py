@@ -1,4 +1,4 @@
-"""The choice of sequences for one aim: judged in the order of what they can bring per minute of station time."""
+"""The choice of sequences for one aim, judged in the order of their largest possible gain per minute of station time."""
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
@@ -30,17 +30,17 @@ _ALL = 0.999
 """Share of the aim that counts as complete."""
 
 _KEPT = 0.5
-"""Share of an offer's gain on the grid that must remain when every rival is fitted."""
+"""Share of an offer's gain, computed on the grid, that must remain when every rival's parameters are fitted."""
 
 Minutes = Callable[[Sequence[SequenceStep]], float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal(Promise):
-    """Steps to measure next, with what is expected of them.
+    """Steps to measure next, with their expected result.
 
-    ids : the effects of the aim; pair : the two rivals that it separates most; empty for unseen effects
-    minutes : of station time; settled : share of the aim that is reached afterwards, 0 … 1
+    ids : the effects of the aim; pair : the two rivals that are separated most, empty for unseen effects
+    minutes : station time; settled : share, 0 … 1, of the aim that is reached afterwards
     """
 
     kinds: tuple[Kind, ...]
@@ -52,7 +52,7 @@ class Proposal(Promise):
 
 @dataclass(frozen=True)
 class Circumstances:
-    """Limits of a proposal: the station's reach and pace, its time for steps, and the minutes that may be spent."""
+    """Limits of a proposal: the station's reach and pace, its time for steps (by default from the pace), the minutes to spend."""
 
     reach: TableReach | None = None
     pace: StationPace = field(default_factory=StationPace)
@@ -71,7 +71,7 @@ class Circumstances:
 
 @dataclass(frozen=True)
 class Offer:
-    """A sequence with the share of the aim after it, the station time until then, and its gain per minute."""
+    """A sequence, the share of the aim reached after it, the total station time, and its gain per minute."""
 
     course: StepSequence
     worth: float
@@ -80,10 +80,10 @@ class Offer:
 
 
 class Offers:
-    """The sequences that may follow chosen ones, judged only as far as their order needs it.
+    """The sequences that may follow chosen ones, judged only as far as their order requires.
 
-    The share of the aim cannot exceed one, so station time alone bounds the gain per minute of a sequence, and the judgement of a
-    sequence, which fits every rival to every other, is left out where its bound is below the best gain per minute.
+    The share of the aim cannot exceed one, so that the station time bounds the gain per minute of a sequence. A sequence whose
+    bound is below the best gain per minute is not judged, because that requires a fit of every rival to every other one.
     """
 
     def __init__(self, search: "ProposalSearch", chosen: Sequence[StepSequence], now: float) -> None:
@@ -95,10 +95,10 @@ class Offers:
         self._judged: dict[int, Offer | None] = {}
 
     def _per_minute(self, gain: float, minutes: float) -> float:
-        return gain / (minutes - self.spent + 1.0)  # a minute for the start of the follow-up
+        return gain / (minutes - self.spent + 1.0)  # one minute to start the follow-up measurement
 
     def _offer(self, index: int) -> Offer | None:
-        """The sequence with what it brings; None if that is too little."""
+        """The judged sequence of an index; None if its gain is too small."""
         if index not in self._judged:
             course, minutes = self.open[index]
             worth = self.search.share([*self.chosen, course])
@@ -125,7 +125,7 @@ class Offers:
                 yield offer
 
     def shortest(self, worth: float, below: float) -> Offer | None:
-        """The shortest sequence that alone reaches a share of the aim in less than some minutes; None if none does."""
+        """The shortest sequence of less than ``below`` minutes that alone reaches the share ``worth``; None if none does."""
         for index in sorted(range(len(self.open)), key=lambda k: self.open[k][1]):
             if self.open[index][1] >= below:
                 return None
@@ -148,13 +148,13 @@ class ProposalSearch:
         self.state = aim.lot.state
         self.reach = around.reach or reach_of(self.state)
         self.pace, self.budget, self.least = around.pace, around.budget, aim.least
-        # dwells during a ramp disturb every effect of temperature: only for effects that respond to its rate
-        answers = [drivers_of_term(self.state, t) for t in aim.terms]
-        self.rated = any("rate" in drivers for drivers in answers)
-        self.timed = any("since_power" in drivers for drivers in answers)
+        # dwells during a ramp disturb all effects of temperature: they are offered only for effects of its rate
+        drivers_of_terms = [drivers_of_term(self.state, t) for t in aim.terms]
+        self.rated = any("rate" in drivers for drivers in drivers_of_terms)
+        self.timed = any("since_power" in drivers for drivers in drivers_of_terms)
 
     def best(self) -> Proposal | None:
-        """Sequences in order, each the best after those before it, until the aim is reached or nothing more helps.
+        """The proposal of sequences chosen one after the other until the aim is reached or no further one helps; None if none.
 
         A single sequence that reaches the aim replaces them if they take more time, or do not reach it.
         """
@@ -171,7 +171,7 @@ class ProposalSearch:
                 break
             chosen, now = [*chosen, taken[0].course], taken[1]
         while chosen and now < _ALL and len(chosen) < 2 * _ROUNDS:
-            # the grid shows no difference any more: what parts them once parts them better twice
+            # no further sequence helps on the grid: repeating the first one may still improve the separation
             promised = self.share([*chosen, chosen[0]], fine=True)
             within = self.minutes([*chosen, chosen[0]]) <= self.around.budget
             if not within or promised - now < min(self.aim.least, 0.5 * (1.0 - now)):
@@ -187,10 +187,10 @@ class ProposalSearch:
         return self._proposal(chosen, now) if chosen else None
 
     def _confirmed(self, chosen: Sequence[StepSequence], offers: Offers, now: float) -> tuple[Offer, float] | None:
-        """The offer with the largest gain per minute whose gain remains when every rival is fitted, and the share after it.
+        """The best offer whose gain remains when every rival is fitted, and the share of the aim after it; None if none helps.
 
-        On the grid alone the wrong rivals seem more distant than they are: an offer is judged with every rival fitted, the best
-        of each kind in turn. Where none keeps half of its gain, the offer with the largest gain is taken.
+        On the grid alone wrong rivals seem more distant than they are. The best offer of each kind is therefore judged with every
+        rival fitted, in order of gain per minute. If none keeps half of its gain, the offer with the largest gain is taken.
         """
         best: tuple[Offer, float] | None = None
         for offer in islice(offers.by_kind(), _TRIED):

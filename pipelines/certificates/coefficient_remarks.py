@@ -1,4 +1,4 @@
-"""Certified coefficients, and remarks for their readers: missing or foreign signatures, differing versions of libraries."""
+"""Certified coefficients, and remarks on their files: missing or foreign signatures, differing versions of libraries."""
 
 import hashlib
 from collections.abc import Iterable, Mapping
@@ -17,7 +17,7 @@ TABLES = ("coefficients", "covariance", "grades")
 
 
 def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
-    """Files of a run, and certificates of its units, without a signature of the configured key; empty where no key is configured.
+    """Remarks on files of a run, and certificates of its units, without a signature by a configured key; empty without keys.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
 
 
 def changed_tables(run: Run) -> list[str]:
-    """Tables of the result of a run that are not as their manifests say, by their hashes."""
+    """Tables of the result of a run whose hashes differ from those in their manifests."""
     names = names_in(run.path)
     present = [name for name in TABLES if {f"{name}.parquet", f"{name}.json"} <= names]
     return [name for name in present if files.sha256(run.path / f"{name}.parquet") != run.manifest(name)["sha256"]]
 
 
 def library_remarks(run: Run) -> list[str]:
-    """Libraries with more than one version among the tables of the run."""
+    """Remarks on libraries with more than one version among the tables of the run."""
     present = [name for name in run.tables() if (run.path / f"{name}.json").is_file()]
     return differing_libraries(run.id, {name: run.manifest(name) for name in present})
 
@@ -112,11 +112,11 @@ def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
                 f"calibrations: {path} is not the table of certificate {calibration.certificate} (its hash "
                 "differs); restore it from a copy"
             )
-        # read_table imports pandas; and a thread pool that is still starting aborts so short a process at its end
+        # read_table would import pandas; a thread pool that is still starting aborts a short process at its end
         table = pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
     except (OSError, pa.ArrowInvalid) as problem:
         raise ArchiveUnusable(
             f"calibrations: {path} cannot be read ({first_line(problem)}); restore it from a copy"
         ) from None
-    # table.take would make an array of the row numbers, and pyarrow asks pandas whether they are a series
+    # not table.take, for which pyarrow imports pandas
     return [row for row in table.to_pylist() if row["unit"] == calibration.serial]

@@ -1,4 +1,4 @@
-"""Results by comparison that can be certified (sweep, random vibration, transverse, shock), and why others cannot."""
+"""Results by comparison (sweep, random vibration, transverse, shock) that can be certified, and the reasons why others cannot."""
 
 from typing import Any
 
@@ -23,11 +23,11 @@ TABLES = ("procedure_results", "procedure_curves", "procedure_points", "uncertai
 
 
 class Comparisons:
-    """The comparisons of a captured run: what each unit can be certified for.
+    """The results by comparison of a captured run, and whether they can be certified for each unit.
 
     Parameters
     ----------
-    run : of a version without comparisons it has none
+    run : the run; one from a version without comparisons has none
     """
 
     def __init__(self, run: Run) -> None:
@@ -50,11 +50,11 @@ class Comparisons:
         }
 
     def reasons(self, unit: str) -> dict[int, str]:
-        """Why the results of each comparison cannot be certified, by its number; empty where they can."""
+        """The reason why the results of each comparison cannot be certified, by its number; an empty text if they can."""
         return {number: self._reason(unit, number, part) for number, part in self.parts.items()}
 
     def verdicts(self, unit: str) -> str:
-        """The verdicts on the models that the certified results rest on, in one line."""
+        """The verdicts on the models behind the certified results, in one line."""
         lines: list[str] = []
         for number in self.results(unit):
             for row in self._models(unit, number):
@@ -65,7 +65,7 @@ class Comparisons:
         return "; ".join(lines)
 
     def _of(self, table: str, unit: str, number: int) -> pd.DataFrame:
-        if table not in self._tables:  # a certificate of each unit of a large lot asks for its own
+        if table not in self._tables:  # grouped once, because each unit of a large lot gets a certificate
             self._tables[table] = {str(name): rows for name, rows in self._run.table(table).groupby("unit", sort=False)}
         rows = self._tables[table].get(unit)
         return pd.DataFrame() if rows is None else rows[rows["number"] == number]
@@ -99,7 +99,7 @@ class Comparisons:
         return self._reference_understated(part, name, rows)
 
     def _reference_understated(self, part: Any, name: str, rows: pd.DataFrame) -> str:
-        """Figures with limits rest on reference_percent of the recipe: it may not be below what the station states."""
+        """A refusal if limited figures use a reference_percent of the recipe below the station's uncertainty; else empty."""
         figures = {figure.name for figure in PROCEDURES[part.kind].figures}
         limited = figures & {*((self._run.about.get("limits") or {}).get("figures") or {})}
         stated = getattr(part, "reference_percent", None)
@@ -121,7 +121,7 @@ class Comparisons:
 
 
 def _unstated(rows: pd.DataFrame, terms: BudgetTerms) -> str:
-    """The terms that results depend on and the station does not state, with the frequencies where it is so."""
+    """A text with the terms that the results need and the station does not state, and their frequencies; else empty."""
     missing: dict[str, list[float]] = {}
     for row in rows_of(rows):
         for name in missing_terms(row, terms):

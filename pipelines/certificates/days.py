@@ -30,7 +30,7 @@ def today() -> str:
 
 
 def months_after(day: str, months: int) -> str:
-    """The day some months later; the last day of the month where that month has no such day."""
+    """The day ``months`` later; the last day of that month if it has no such day."""
     start = date.fromisoformat(day)
     years, month = divmod(start.month - 1 + months, 12)
     year, month = start.year + years, month + 1

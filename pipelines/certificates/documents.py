@@ -1,4 +1,4 @@
-"""The JSON documents of calibrations: certified, valid, revoked, written as certificates, their files checked."""
+"""The JSON documents of calibrations: certified, valid and revoked ones, written certificates, and checks of their files."""
 
 from typing import Annotated, Any, Literal, NotRequired
 
@@ -39,7 +39,7 @@ class CertifiedDocument(LedgerEntryDocument):
 
     certificate: Annotated[str, "number: serial and sequence"]
     action: Annotated[Literal["certify", "supersede"], "`supersede`: it ended other calibrations"]
-    was_there: Annotated[bool, "true if it was in the ledger before"]
+    was_there: Annotated[bool, "true if it was already in the ledger"]
 
 
 class CertifyDocument(TypedDict):
@@ -118,7 +118,7 @@ class CertificateListDocument(TypedDict):
     """``certificate list --json``: the certificates of an archive, by unit."""
 
     archive: str
-    at: Annotated[str | None, "the day on which those that are listed are valid; null: all are listed"]
+    at: Annotated[str | None, "day on which the listed certificates are valid; null: all are listed"]
     certificates: Annotated[list[CalibrationDocument], "by serial, then oldest first"]
 
 
@@ -169,7 +169,7 @@ class CheckedFileDocument(TypedDict):
         list[str], "subjects of the signers' certificates; empty: not signed, or the signature does not hold"
     ]
     checks: list[FileCheckDocument]
-    proven_by: Annotated[list[Literal["signature", "archive"]], "what shows its origin; empty: nothing"]
+    proven_by: Annotated[list[Literal["signature", "archive"]], "what proves its origin; empty: nothing"]
     accepted: Annotated[bool, "true if no check is bad and the origin is proven"]
 
 

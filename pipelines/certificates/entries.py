@@ -32,8 +32,8 @@ class LedgerEntry:
     evidence : hashes of the manifests of the run that support the decision, by table.
     previous : hash of the file of the unit's previous event; empty for the first.
     adequacy : verdict on the run's model with its p, as it was certified; empty in events of earlier versions.
-    covers : ``static`` (coefficients) and the procedures whose results by comparison it has, with blanks between. A calibration
-    ends earlier ones that cover any of the same.
+    covers : ``static`` (coefficients) and procedures whose results by comparison it states, separated by blanks; a calibration
+        ends earlier ones that cover any of the same.
     """
 
     serial: str
@@ -77,7 +77,7 @@ _NAMES = {field.name for field in fields(LedgerEntry)}
 
 
 def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
-    """The event of a file; refused where the content is no event or has a newer schema.
+    """The event with the content of a file; refuses content that is no event or has a newer schema.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """The ledger of calibrations: for each unit the events that begin and end their validity.
 
-``calibrations/<aa>/<hash of the serial>/<sequence>.json``: a unit is found by reading one folder, for any number of units,
-and no serial can name a place outside. Each event is a file that is created once. Of two processes that write the next event of
-a unit one fails, reads the other's event and decides again; so every event was decided with all earlier events known.
+``calibrations/<aa>/<hash of the serial>/<sequence>.json``: a unit is found by reading one folder, whatever the number of units,
+and no serial can lead to a path outside. Each event is a file that is created once. If two processes write the next event of a
+unit, one of them fails, reads the other's event and decides again, so that every decision accounts for all earlier events.
 """
 
 import hashlib
@@ -76,7 +76,7 @@ class Ledger:
         ----------
         event : with serial, run, validity and evidence; the ledger adds the other values.
         supersede : also end calibrations that begin later and overlap.
-        amend : whether it takes the place of a certificate of the same run that holds on its first day; else that one stands
+        amend : whether it replaces a certificate of the same run that is valid on its first day; if not, that one is returned
         """
         refuse_serial(event.serial, "certify")
         event = replace(event, reason=event.reason.strip())
@@ -133,7 +133,7 @@ class Ledger:
         return written
 
     def anchor(self, events: Sequence[LedgerEntry]) -> None:
-        """Add events to the chain of the archive, so that the removal of one is detected."""
+        """Record events in the archive's hash chain, so that the removal of one is detected."""
         if events:
             paths = {self._name(event.serial, event.sequence): event for event in events}
             sealed = {path: files.sha256(self.root / path) for path in sorted(paths)}
@@ -189,7 +189,7 @@ class Ledger:
 
 
 def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
-    """Events of a unit's folder with the hashes of their files; refused where one between them is missing."""
+    """Events of a unit's folder with the hashes of their files; refuses a gap in their numbers."""
     events: list[tuple[LedgerEntry, str]] = []
     for count, path in enumerate(numbered_files(folder), 1):
         data = path.read_bytes()
@@ -225,7 +225,7 @@ def _same(calibration: Calibration, event: LedgerEntry) -> bool:
 
 
 def _stands_for(calibration: Calibration, event: LedgerEntry) -> bool:
-    """Whether a calibration of the same run, of what the event covers, holds on the first day of the event."""
+    """Whether a calibration of the same run and the same subjects is valid on the first day of the event."""
     old = (calibration.run, calibration.event.coefficients, calibration.event.covers)
     return old == (event.run, event.coefficients, event.covers) and calibration.holds(event.start)
 
@@ -243,7 +243,7 @@ def left_valid(archive: Archive, serial: str, ended: Sequence[int]) -> list[str]
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
-    """By serial, the calibration that certifies this run: the valid calibration, else the last.
+    """The calibrations that certify a run, by serial: for each unit the valid one, else the last.
 
     Raises
     ------

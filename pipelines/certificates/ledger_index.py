@@ -1,7 +1,7 @@
 """The index of the events of all units, so that a hundred thousand small files are read only once.
 
-``index/ledger/<digit>.noted`` has the events of units whose folder name begins with this digit, after a line with their seal.
-It is made only from the files of the ledger and can be removed at any time; an event is used while its file has the same size and
+``index/ledger/<digit>.noted`` has the events of units whose folder name begins with this digit, after a line with its seal. It is
+derived from the files of the ledger and can be removed at any time; an indexed event is used while its file has the same size and
 time.
 """
 
@@ -40,9 +40,9 @@ class IndexedEvent(NamedTuple):
 
 @dataclass
 class Histories:
-    """The events of every unit, in order; and the faults of the others, by folder.
+    """The events of every intact unit, in order, and the fault of every other one, by folder.
 
-    read : number of files that were read
+    read : number of files that were read instead of taken from the index
     """
 
     units: list[list[LedgerEntry]] = field(default_factory=list[list[LedgerEntry]])
@@ -79,7 +79,7 @@ def _events(histories: Histories, root: Place, digit: str, stamps: Mapping[str, 
 
 
 def _gather(histories: Histories, root: Place, events: Mapping[str, LedgerEntry | str]) -> None:
-    """Collect the events of every unit; a unit with a missing, foreign or unreadable event is a problem."""
+    """Collect the events of every unit; a unit with a missing, foreign or unreadable event is added to ``problems``."""
     by_unit: dict[str, list[str]] = {}
     for name in sorted(events):
         by_unit.setdefault(name.rpartition("/")[0], []).append(name)
@@ -107,7 +107,7 @@ def _wrong(event: LedgerEntry, folder: str, count: int, name: str) -> str:
 
 
 def all_read(top: Place, names: Sequence[str]) -> dict[str, LedgerEntry | str]:
-    """The events of files below a folder, read by several threads, because a disk serves many requests in the time of one."""
+    """The events of files below a folder, by name, or their faults; read by threads, because disks serve requests in parallel."""
     groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
     out: dict[str, LedgerEntry | str] = {}
     with ThreadPoolExecutor(READERS) as pool:
@@ -137,7 +137,7 @@ def _read(top: Place, name: str) -> LedgerEntry | str:
 
 
 def indexed_events(path: Place) -> tuple[dict[str, IndexedEvent], str]:
-    """The indexed events by the path of their file, and the state of its seal; empty where the seal is not sound."""
+    """The indexed events by the path of their file, and the state of the index's seal; no events unless the seal is intact."""
     import pyarrow.parquet as pq
 
     try:

@@ -1,4 +1,4 @@
-"""The measurement that a run analyses: which it is, its start and its end."""
+"""The measurement that a run analyses: its identity, its start and its end."""
 
 from pipelines.archive import Run, files
 from pipelines.certificates.days import day_of
@@ -7,7 +7,7 @@ START, END = "run.json", "readings.json"
 
 
 def measurement_of(run: Run) -> str:
-    """What all analyses of one measurement have in common: its capture, else the file that it was imported from, else the run."""
+    """An identifier common to all analyses of one measurement: its capture, else the imported file, else the run."""
     about = run.about
     source = (about.get("source") or {}).get("sha256")
     return str(about.get("capture") or source or about.get("rerun_of") or run.id)
@@ -39,9 +39,10 @@ def measured_on(run: Run) -> str:
 
 
 def _analysed_again(run: Run) -> str | None:
-    """When the data of a re-analysis were measured; None for a run that measured its own, or was imported.
+    """Time at which the data of a re-analysis were measured; None for a run with its own measurement, or an import.
 
-    A re-fit by an older version does not state which run it analyses again: it began after the last event of its capture.
+    A re-fit by an older version does not state the run that it analyses again; it is recognised by a start after the last event
+    of its capture.
     """
     about, records = run.about, run.records
     if about.get("rerun_of"):

@@ -1,8 +1,8 @@
-"""Journal of the writing of coefficients into devices: for each unit the begun operations and their results.
+"""Journal of programming coefficients into devices: for each unit the operations begun and their results.
 
-``programming/<aa>/<hash of the serial>/<sequence>.json``, created once each and named in the chain of the archive. An entry
-``begun`` is written before the first write to the device, so that a process that was killed leaves a beginning without an end:
-its unit is not certified until it is programmed again.
+``programming/<aa>/<hash of the serial>/<sequence>.json``: each file is created once and recorded in the archive's hash chain. The
+entry ``begun`` is written before the first write to the device. After a process that was killed it has no result, and the unit is
+not certified until it is programmed again.
 """
 
 from collections.abc import Mapping
@@ -45,7 +45,7 @@ def programming(root: Place, serial: str) -> list[dict[str, Any]]:
 
 
 def add(root: Place, serial: str, event: Event, content: Mapping[str, Any]) -> dict[str, Any]:
-    """The next entry of a unit's journal, written durably and named in the chain."""
+    """Write the next entry of a unit's journal durably, record it in the hash chain, and return it."""
     by = provenance()
     while True:
         known = programming(root, serial)
@@ -60,7 +60,7 @@ def add(root: Place, serial: str, event: Event, content: Mapping[str, Any]) -> d
 
 
 def unproved(root: Place, serial: str) -> str:
-    """Reason why the memory of a unit is not verified; empty where it is, or where it was never written."""
+    """The reason why the memory of a unit is not verified; empty if it is, or if it was never written."""
     known = programming(root, serial)
     if not known or known[-1]["event"] == "proved":
         return ""

@@ -1,4 +1,4 @@
-"""Refusals of the ledger with their reasons: a strange serial, an overdue standard, dates that are not allowed, and more."""
+"""Refusals of the ledger with their reasons, such as an invalid serial, an overdue standard, or dates that are not allowed."""
 
 import re
 from collections.abc import Sequence

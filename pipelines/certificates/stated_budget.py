@@ -17,7 +17,7 @@ Row = dict[str, Any]
 class StatedBudget:
     """The uncertainty of one unit of a run.
 
-    frame : of the results; grade_source : what the figures rest on; validity_months : period that the error is stated for
+    frame : frame of the results; grade_source : basis of the figures; validity_months : period for which the error is stated
     quantities : rows of ``uncertainties``, each with the rows of its budget (JCGM 100; EA-4/02)
     decisions : rows of ``figures`` with a limit; their ``pfa`` is the specific probability of false acceptance (JCGM 106, 7.4)
     """
@@ -44,7 +44,7 @@ def stated_budget(run: Run, unit: str) -> StatedBudget:
             f"run {run.id}: no uncertainty budget, one is needed; its station states no [uncertainty] (noise only)"
         )
     tables = (run.table(name) for name in ("uncertainties", "budget", "figures"))
-    # the unit's rows first: a certificate of each unit of a large lot asks for its own
+    # filtered first, because a certificate is made for each unit of a large lot
     sums, parts, figures = (rows_of(table[table["unit"] == unit]) for table in tables)
     if not sums:
         raise WrongUse(
@@ -68,5 +68,5 @@ def stated_budget(run: Run, unit: str) -> StatedBudget:
 
 
 def edge(row: Row) -> float:
-    """The limit of a figure: of its magnitude, or its least value; nan where it has none."""
+    """The limit of a figure: an upper limit of its magnitude, else a lower limit; nan if it has none."""
     return float(row["limit"] if np.isfinite(row["limit"]) else row.get("least", np.nan))

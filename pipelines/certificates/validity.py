@@ -1,7 +1,7 @@
 """Periods of validity of the calibrations of a unit: a pure function of its events in the order of writing.
 
-A new calibration ends those of the same subject that are valid on its first day, so that a unit never has two valid calibrations
-of one subject on one day: its coefficients, its sensitivity over frequency, shocks.
+A new calibration ends those of the same subject (coefficients, sensitivity over frequency, shocks) that are valid on its first
+day, so that a unit never has two valid calibrations of one subject on one day.
 """
 
 from collections.abc import Iterable, Sequence
@@ -82,7 +82,7 @@ class Calibration:
         return self.start <= day < self.until
 
     def state_on(self, day: str) -> str:
-        """Its state on a day, in words: ``valid``, ``begins later``, ``expired``, or how it ended before its time."""
+        """Its state on a day as text: ``valid``, ``begins later``, ``expired``, or how it ended prematurely."""
         if self.holds(day):
             return "valid"
         if self.state == "revoked":
@@ -92,7 +92,7 @@ class Calibration:
         return "expired" if self.state == "valid" else f"superseded {self.reason}"
 
     def key_values(self) -> list[str]:
-        """The entry of exports and reports: certificate, first day, the day after the last, state, reason of its end."""
+        """Values for exports and reports: certificate, first day, the day after the last, state, reason of its end."""
         return [self.certificate, self.start, self.until, self.state, self.reason]
 
     def sentence(self) -> str:
@@ -147,10 +147,10 @@ def calibrations_of(events: Iterable[LedgerEntry]) -> list[Calibration]:
 
 
 def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersede: bool) -> tuple[int, ...]:
-    """Sequences of the calibrations that one from ``start`` to ``until`` ends.
+    """Sequences of the calibrations that a new one from ``start`` to ``until`` ends.
 
-    Earlier calibrations end where the new one begins. Later ones are ended only with ``supersede``, because otherwise a
-    calibration that is written afterwards would silently replace a newer one.
+    Earlier calibrations end where the new one begins. Calibrations that begin later are ended only with ``supersede``, because
+    otherwise a calibration entered afterwards would silently replace a newer one.
     """
     clash = [old for old in known if old.start < old.until and old.start < until and start < old.until]
     later = [old for old in clash if old.start > start]

@@ -39,13 +39,13 @@ def compare(
     fresh_history: pd.DataFrame | None = None,
     before: Sequence[str] | None = None,
 ) -> ComparisonDocument:
-    """Errors of a model in a lot, and in a fresh run of these units with the coefficients unchanged.
+    """Errors of a model in a lot, and in a fresh run of the same units with the coefficients unchanged.
 
     Parameters
     ----------
-    dwells, fresh : exchange format; the model is fitted to ``dwells`` only
+    dwells, fresh : tables in the exchange format; the model is fitted to ``dwells`` only
     history, fresh_history : temperatures against time of the two runs
-    before : the model that this one was extended from; the effects added to it are then judged
+    before : effects of the model that this one extends; the added effects are then judged
 
     Raises
     ------
@@ -105,14 +105,14 @@ def _compared(
         judged_by = progress(
             lesser, model, out, lot, lambda: doubt_of_run(measurement, problem.lot, list(before), list(effects))
         )
-        if again is not None and _remember(again, [t for t in model.terms if t.effect.id not in set(before)]):
+        if again is not None and _needing_history(again, [t for t in model.terms if t.effect.id not in set(before)]):
             judged_by["confirmed"], judged_by["reason"] = None, "its prediction needs the history of the fresh run"
         answer["progress"] = judged_by
     if again is not None:
         answer["warnings"] += [
             f"{name} depends on the temperature between the dwells, and no history of the fresh run was given: its prediction "
             "there is unreliable; give --fresh-temperatures FILE"
-            for name in _remember(again, model.terms)
+            for name in _needing_history(again, model.terms)
         ]
     return answer
 
@@ -122,12 +122,12 @@ def without_history(measurement: Measured, terms: Sequence[Term]) -> list[str]:
     return [
         f"{name} depends on the temperature between the dwells, and no history was given: its size is unreliable; give "
         "--temperatures FILE"
-        for name in _remember(measurement, terms)
+        for name in _needing_history(measurement, terms)
     ]
 
 
-def _remember(measurement: Measured, terms: Sequence[Term]) -> list[str]:
-    """The effects that depend on the temperature between the dwells; none if its history is given."""
+def _needing_history(measurement: Measured, terms: Sequence[Term]) -> list[str]:
+    """Ids of effects that depend on the temperature between the dwells; empty if its history is given."""
     if measurement.state.temperature is None or measurement.state.history is not None:
         return []
     effects = [t.effect for t in terms if not isinstance(t.effect, Handling)]
@@ -171,11 +171,11 @@ def _by_pose(measurement: Measured, left: Array) -> list[PoseComparison]:
 
 
 def doubt_of_run(measurement: Measured, lot: Lot, before: Sequence[str], after: Sequence[str]) -> str | None:
-    """Why one run cannot tell the added effects from a fault of the run, as text; None if nothing speaks for a fault.
+    """The reason why one run cannot distinguish the added effects from a fault of the run; None if there is no sign of a fault.
 
-    A fault (a table that slipped, units exchanged, a thermometer) lies in the dwells that are left out as in the others, so
-    that what imitates it predicts them. The run is therefore searched for faults without and with the effects, and the model
-    with them has to be adequate.
+    A fault (a table that slipped, exchanged units, a thermometer offset) affects the dwells left out like the others, so that an
+    effect that imitates it predicts them. The run is therefore searched for faults without and with the effects, and the model
+    with the effects must be adequate.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Test of the effects added to a model, by a fresh run or else by dwells left out; the error of all its versions."""
+"""Test of effects added to a model, by a fresh run or else by dwells left out; and the errors of all versions of a model."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -17,21 +17,21 @@ from pipelines.diagnosis.result_rows import known
 from pipelines.jobs.model_files import Version
 from schemas.units import MICRO
 
-_TOLD = {"blocks of time": "stretches of time"}
-"""Kinds of dwells left out in the words of the texts, where these differ."""
+_WORDED_KINDS = {"blocks of time": "stretches of time"}
+"""Names of kinds of dwells left out in texts, where they differ from the keys."""
 
 
 def progress(
     before: Model, after: Model, out: LeftOut, fresh: Lot | None, doubt: Callable[[], str | None] = lambda: None
 ) -> Confirmation:
-    """The evidence on the effects by which two models differ.
+    """The evidence for or against the effects by which two models differ.
 
     Parameters
     ----------
-    before, after : fitted to the same dwells; out : of ``after``, on dwells left out
-    fresh : the fresh run in the scale of the first; None if there is none
-    doubt : why the run itself may imitate the effects, see :func:`pipelines.diagnosis.compare.doubt_of_run`; called only
-        without a fresh run, where dwells left out are for the effects
+    before, after : models fitted to the same dwells; out : cross-validation of ``after``
+    fresh : the fresh run in units of the first run's scale factors; None if there is none
+    doubt : function that gives a reason why a fault of the run may imitate the effects, see
+        :func:`pipelines.diagnosis.compare.doubt_of_run`; called only without a fresh run, if dwells left out favour the effects
 
     Returns
     -------
@@ -49,7 +49,7 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> Confirma
     problem = Problem(fresh)
     rises, reason = None, None
     if change.confirmed is True:
-        # with the coefficients unchanged, less the bias of the day
+        # residuals with unchanged coefficients, less the bias of the fresh run
         left = [without_own_bias(problem, fitted.terms, residuals_of(problem, fitted)) for fitted in (old, new)]
         rises = _clear_rise("the error on the fresh run", left[0], left[1]) or _rises_left_out(
             left_out(before, also=after.terms), out
@@ -87,11 +87,11 @@ def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None
         against = f"their log likelihood changes by {gain:+.1f}, more than {LEFT_OUT:g} is needed"
     else:
         rises = _rise("the error on dwells left out", *errors)
-        # the search for a fault of the run is the longest part: only where it decides
+        # the search for a fault of the run takes longest and is made only if it decides
         against = rises or _disagreement(gains, falls) or doubt()
     return {
         "judged_by": "dwells left out",
-        # absence of evidence is no evidence: without a fresh run nothing is refuted
+        # absence of evidence is not evidence of absence: without a fresh run nothing is refuted
         "confirmed": None if against else True,
         "rises": rises,
         "reason": against,
@@ -108,7 +108,7 @@ def _disagreement(gains: Mapping[Kind, float], falls: Mapping[Kind, tuple[float,
     """A kind of dwells left out that can judge the effects and is not clearly for them, as text; None if there is none."""
     for kind, gain in sorted(gains.items(), key=lambda item: falls[item[0]][0]):
         fall, error = falls[kind]
-        left = f"with {_TOLD.get(kind, kind)} left out"
+        left = f"with {_WORDED_KINDS.get(kind, kind)} left out"
         # an error that cannot be stated is none that the fall exceeds
         if not fall > CONFIRMED * error:
             return f"{left} {fall_of(MICRO * fall, known(MICRO * error))}, no clear fall"
@@ -172,7 +172,7 @@ def _decrease(before: Array, after: Array) -> float:
 
 
 Compare = Callable[[list[str], list[str] | None], ComparisonDocument]
-"""Errors of a model as :func:`pipelines.diagnosis.compare.compare` states them; the effects added to the second are judged."""
+"""Function of a model's effects and those of the model before, with the result of :func:`pipelines.diagnosis.compare.compare`."""
 
 
 def evolution(versions: Sequence[Version], compare: Compare) -> list[VersionDocument]:
@@ -201,7 +201,7 @@ def evolution(versions: Sequence[Version], compare: Compare) -> list[VersionDocu
 
 
 def change_row(version: Version) -> VersionDocument:
-    """The change of a version with author, date and reason; its errors are not judged yet."""
+    """The row of a version with its change, author, date and reason; its errors are empty."""
     change = version.change
     return {
         "version": version.number,
@@ -231,7 +231,7 @@ def text_of(row: VersionDocument, progress: Confirmation | None) -> str:
         return "removed" if row["removed"] else "nothing added"
     fall = _fall_text(progress)
     if progress["judged_by"] == "fresh run":
-        return _told_by_fresh(progress, fall)
+        return _text_by_fresh(progress, fall)
     gain = progress["log_density"]
     if progress["confirmed"]:
         return (
@@ -248,7 +248,7 @@ def text_of(row: VersionDocument, progress: Confirmation | None) -> str:
     return f"not decided by dwells left out: {text}; {decides}"
 
 
-def _told_by_fresh(progress: Confirmation, fall: str) -> str:
+def _text_by_fresh(progress: Confirmation, fall: str) -> str:
     part, error = progress["part"], progress["part_u"]
     if part is None or error is None:
         return "not decided: the dwells of the fresh run do not show the effect; measure the same poses and temperatures again"
@@ -263,7 +263,7 @@ def _told_by_fresh(progress: Confirmation, fall: str) -> str:
 
 
 def _fall_text(progress: Confirmation) -> str:
-    """The decrease of the error with its uncertainty; of a fresh run, without what may change from day to day."""
+    """The decrease of the error with its uncertainty; for a fresh run with the coefficients that were fitted to it again."""
     fall = progress["fall_ug"]
     if fall is None:
         return "the error cannot be judged on dwells left out"

@@ -30,9 +30,9 @@ _SAME_G, _SAME_DEG = 0.02, 1.0
 
 
 def default_model(dwells: pd.DataFrame) -> list[str]:
-    """The model that is judged by default: with temperature terms when it varies by more than 5 °C.
+    """Ids of the model that is judged by default: with temperature terms if the temperature varies by more than 5 °C.
 
-    One pose shows a bias and its drivers, but neither scale nor misalignment.
+    Dwells in one pose determine a bias and its drivers, but neither scale nor misalignment.
     """
     if _one_pose(dwells):
         return ["bias", *(THERMAL[:1] if "bias_temperature" in _of_temperature(dwells) else ())]
@@ -41,7 +41,7 @@ def default_model(dwells: pd.DataFrame) -> list[str]:
 
 
 def _one_pose(dwells: pd.DataFrame) -> bool:
-    """Whether the reference, or the table, is the same in all dwells."""
+    """Whether the reference force, or the pair of table angles, is the same in all dwells."""
     for columns, least in ((("force_x", "force_y", "force_z"), _SAME_G), (("outer_deg", "inner_deg"), _SAME_DEG)):
         if all(name in dwells.columns and dwells[name].notna().all() for name in columns):
             return all(float(np.ptp(dwells[name])) < least for name in columns)
@@ -49,6 +49,7 @@ def _one_pose(dwells: pd.DataFrame) -> bool:
 
 
 def _of_temperature(dwells: pd.DataFrame) -> list[str]:
+    """The default model for several poses, with temperature terms if the temperature varies enough."""
     for column in ("unit_C", "chamber_C"):
         if column in dwells.columns and dwells[column].notna().any():
             return [*DEFAULT, *THERMAL] if float(np.ptp(dwells[column].dropna())) > _WARM else list(DEFAULT)
@@ -62,9 +63,9 @@ def diagnose(
 
     Parameters
     ----------
-    dwells : exchange format
-    history : temperatures against time; for lag and hysteresis, if available
-    effects : the model to judge; :func:`default_model` where None
+    dwells : table in the exchange format
+    history : temperatures against time, for lag and hysteresis; None if not recorded
+    effects : ids of the model to judge; :func:`default_model` if None
 
     Raises
     ------
@@ -80,11 +81,11 @@ def examined(
     effects: Sequence[str] | None,
     left_out: Collection[str] = (),
 ) -> tuple[Measured, list[Fault], Diagnosis | None]:
-    """Readings, data faults and the diagnosis of the units without a fault; None where every unit has one.
+    """Readings, data faults, and the diagnosis of the units without a fault (None if every unit has one).
 
     Parameters
     ----------
-    left_out : ``UNIT:DWELL``, removed from ``dwells`` on purpose, so that it is no fault if a unit lacks them
+    left_out : ``UNIT:DWELL`` of dwells removed from ``dwells`` on purpose: their absence is not a fault
     """
     model = list(effects) if effects else default_model(dwells)
     catalogue.get_all(model)
@@ -92,7 +93,7 @@ def examined(
     if lot is None:
         return measurement, faults, None
     try:
-        # two threads on small matrices wait for each other: on a busy machine it takes sixty times as long
+        # threads on small matrices wait for each other: on a busy machine two of them take sixty times as long as one
         with threadpool_limits(1):
             return measurement, faults, diagnose_lot(lot, model, generator())
     except InertialError as problem:
@@ -112,8 +113,8 @@ def document(
     Parameters
     ----------
     effects : ids of the judged model
-    following : what to measure next; by the capabilities of the station that the run shows if None
-    left_out : ``UNIT:DWELL``, removed on purpose: no notice says that they are missing
+    following : the next measurements; None: those for a station with the capabilities that the run implies
+    left_out : ``UNIT:DWELL`` of dwells removed on purpose, without a notice that they are missing
     """
     blocked = [_fault(measurement, f) for f in faults]
     if diagnosis is None:
@@ -215,8 +216,8 @@ def _fault(measurement: Measured, fault: Fault) -> BlockingFault:
 class Examination:
     """A diagnosis of dwells.
 
-    document : for programs, with keys beyond the fixed ones
-    measured, diagnosis : the readings, and their diagnosis; None if every unit has a data fault
+    document : the JSON document
+    measured, diagnosis : the readings, and their diagnosis, None if every unit has a data fault
     """
 
     document: DiagnosisDocument
@@ -236,12 +237,12 @@ def examination(
     judged: Sequence[str] | None,
     left_out: Collection[str] = (),
 ) -> Examination:
-    """The diagnosis of dwells against a model, on one thread: the matrices are small.
+    """The diagnosis of dwells against a model, on one thread, because the matrices are small.
 
     Parameters
     ----------
-    judged : effects of the model; the default model if None
-    left_out : ``UNIT:DWELL``, which were removed from ``table`` on purpose
+    judged : ids of the model; the default model if None
+    left_out : ``UNIT:DWELL`` of dwells removed from ``table`` on purpose
     """
     effects = list(judged) if judged else default_model(table)
     keep_memory()

@@ -40,11 +40,11 @@ class ErrorFigures(NoiseFigures):
 
 
 class FailingDriver(TypedDict):
-    """A recorded quantity that the residual follows."""
+    """A recorded quantity that the residual depends on."""
 
     driver: str
     axes: list[str]
-    share: Annotated[float, "share of the excess residual that follows the driver"]
+    share: Annotated[float, "share of the excess residual that the driver explains"]
     p_value: float
 
 
@@ -132,14 +132,16 @@ class RemovedDwells(TypedDict):
 
 
 class UnexplainedExcess(TypedDict):
-    """Residual that follows a quantity, without an effect of the catalogue that explains it."""
+    """Residual that depends on a quantity, without an effect of the catalogue that explains it."""
 
     driver: str
     shape: str
     p_value: float
-    part: Annotated[str, "what follows the driver: bias, scale, axes or transfer, the transfer curve"]
-    text: Annotated[str, "the same as a sentence without its end"]
-    period_s: Annotated[float | None, "of a swing with the time, s; null of another curve"]
+    part: Annotated[
+        str, "what depends on the driver: bias, scale, axes (their directions) or transfer (the transfer curve)"
+    ]
+    text: Annotated[str, "the same as a sentence without a full stop"]
+    period_s: Annotated[float | None, "period of an oscillation in time, s; null: another curve"]
 
 
 class NextMeasurement(TypedDict):
@@ -187,7 +189,7 @@ class SmallestNamed(TypedDict):
 
 
 class SuspectedEffects(TypedDict):
-    """What a model that fails without a named cause lacks most probably."""
+    """The most probable missing effects of a model that fails without a named cause."""
 
     effects: Annotated[list[str], "best first"]
     p_value: Annotated[float, "probability, over all effects tried, that noise explains as much"]
@@ -197,7 +199,7 @@ class SuspectedEffects(TypedDict):
 
 
 class SuggestedFormula(TypedDict):
-    """A formula for a model file that follows the unexplained quantity."""
+    """A formula for a model file that depends on the unexplained quantity."""
 
     id: str
     columns: list[str]
@@ -217,10 +219,10 @@ class DiagnosisDocument(TypedDict):
     unexplained: UnexplainedExcess | None
     unseen: Annotated[list[str], "effects that this plan cannot show"]
     unseen_in_part: list[UnseenInPart]
-    smallest_named: Annotated[list[SmallestNamed], "those that slow noise hides most first"]
+    smallest_named: Annotated[list[SmallestNamed], "effects hidden most by slow noise first"]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
-    suspected: Annotated[SuspectedEffects | None, "null: something is named, or noise explains as much as a rule"]
+    suspected: Annotated[SuspectedEffects | None, "null: a cause is named, or noise often explains as much"]
     reason: Annotated[str | None, "why it cannot be judged; null: it can"]
     evidence: VerdictEvidence | None
     leave_out: Annotated[LeaveOut | None, "null: no such dwell"]

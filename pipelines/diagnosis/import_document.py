@@ -25,13 +25,13 @@ def import_document(
     stated: ImportReferences | None,
     working: Callable[[str], AbstractContextManager[Any]],
 ) -> dict[str, Any]:
-    """Read, judge and store one recording; the document for JSON.
+    """Read, judge and store one recording; returns the document for JSON.
 
     Parameters
     ----------
-    keys : of the mapping; ``where`` they stand, for messages
-    fit : the name of a fit; empty: none
-    working : shows what is done, until it is
+    keys : keys of the mapping; where : their source, for messages
+    fit : name of a fit; empty: none
+    working : context manager that shows a text while its block runs
     """
     from pipelines.diagnosis.inputs import file_beside
     from pipelines.importers import keep, record, sources
@@ -42,7 +42,7 @@ def import_document(
     name = " + ".join(path.name for path in paths)
     columns, units = keys.get("columns"), keys.get("units")
     if isinstance(columns, dict) and isinstance(units, dict) and "output" in units:
-        mapped.build(keys, where)  # an error of the mapping is reported before a file is read
+        mapped.build(keys, where)  # reports an error of the mapping before any file is read
     with working(f"reading {name}"):
         time = str(columns.get("time", "")) if isinstance(columns, dict) else ""
         content, source, breaks = sources.read(
@@ -64,7 +64,7 @@ def import_document(
         with working("fitting and judging"):
             judged = judge(fit, data, how)
     run = keep.keep(data, source, how, judged, archive, stated)
-    turned = fit == "plane" and judged is not None and judged.adequate is not False  # its one axis is meant to be still
+    turned = fit == "plane" and judged is not None and judged.adequate is not False  # one axis is still on purpose
     slips = (  # covariates whose name is close to a known one
         f"'{shown(name)}' is imported as a covariate; if you mean {' or '.join(close)}, import again with that name"
         for name, close in how.likely_slips.items()
@@ -90,7 +90,7 @@ def import_document(
 def _table_of_dwells(
     table: pd.DataFrame, keys: dict[str, Any], path: Path, source: SourceFile, fit: str, archive: str | None
 ) -> dict[str, Any]:
-    """A table of dwells in the exchange format, which states by its columns what a mapping would."""
+    """Import a table of dwells in the exchange format, whose column names replace a mapping; returns the document."""
     from pipelines.diagnosis.inputs import file_beside
     from pipelines.importers.exchange import checked, read_history
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
@@ -124,7 +124,7 @@ def _table_of_dwells(
 
 
 def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
-    """The mapping, with the unit that the file states where none was given; a mapping without columns or unit is refused."""
+    """The mapping, completed by the unit that the file states; a mapping without columns or unit is refused."""
     from pipelines.importers import mapping as mapped
     from pipelines.importers import stated_units
 

@@ -1,4 +1,4 @@
-"""Six labelled faces: the fit and the noise of every other model, the published method beside it, and the verdict."""
+"""Six labelled faces: the usual fit with its noise, the published method for comparison, and the verdict."""
 
 from itertools import combinations
 
@@ -21,15 +21,15 @@ from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
 MODEL = ("bias", "scale", "misalignment")
 COVERAGE = 2.0
-"""Factor k of the printed uncertainties: the standard errors of a fit hold Student's factor for it already."""
+"""Coverage factor k of the printed uncertainties; the standard errors of a fit already include Student's factor."""
 GROSS = 0.05
-"""Smallest part of gravity along a face placed by hand: cos 18° is 0.95."""
+"""Largest misfit of the faces over gravity: a face placed by hand at 18° has cos 18° = 0.95 of gravity along it."""
 _ON_AXIS = 0.9
-"""Least cosine of the angle between an output and its axis: 25° where a hand turns the device."""
+"""Smallest cosine of the angle between an output and its axis: 25° for a device turned by hand."""
 _ODD = 0.5
-"""Distance between the sums of two pairs of faces, over their distances from the third sum, below which the third pair leans."""
+"""Ratio of the smallest to the middle distance between the sums of two pairs of faces, below which the third pair leans."""
 _NOISELESS = 1e-6
-"""Noise over gravity that stands for noise that was not recorded: far below any scatter, which alone counts then."""
+"""Noise over gravity that is assumed if none was recorded: far below any scatter, which then decides alone."""
 
 
 def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
@@ -83,7 +83,7 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
 
 
 def _with_noise(dwells: pd.DataFrame, plain: Faces) -> pd.DataFrame:
-    """The dwells with their noise; where none is recorded it is so small that the scatter about the fit decides."""
+    """The dwells with their noise; if none is recorded, with one so small that the scatter about the fit decides."""
     if {*SPREAD_COLUMNS, "n"} <= set(dwells.columns):
         return dwells
     made = dwells.assign(n=1)
@@ -104,9 +104,9 @@ def _values(coefficients: pd.DataFrame, column: str) -> tuple[Array, Array]:
 
 
 def _exchanged(up: Array, down: Array, gravity: float) -> str:
-    """The two labels whose exchange makes the faces agree; empty where there are none.
+    """A text with the two labels whose exchange makes the faces agree; empty if there are none or several.
 
-    The response has to be that of axes that read themselves, or an exchange of a whole axis would fit as well.
+    Each output must respond mainly to its own axis, because an exchange of two axes would fit as well.
     """
     means = np.concatenate([up, down])
     names = [f"{sign}{axis}" for sign in "+-" for axis in AXES]
@@ -123,13 +123,13 @@ def _exchanged(up: Array, down: Array, gravity: float) -> str:
 
 
 def _askew(up: Array, down: Array, response: Array) -> str:
-    """A message that names the pair of faces of which one leans; empty where the three pairs disagree alike.
+    """A message that names the pair of faces of which one leans; empty if the three pairs disagree by similar amounts.
 
-    The outputs of a pair add up to twice the bias; a face that leans by an angle adds the force of that angle, across it.
+    The outputs of a pair add up to twice the bias; a face that leans by an angle adds a force of that angle across it.
 
     Parameters
     ----------
-    response : (3, 3), output for gravity
+    response : (3, 3), output unit, output under gravity
     """
     sums = (up + down) @ np.linalg.inv(response).T
     apart = np.array([np.linalg.norm(sums[k - 1] - sums[k - 2]) for k in range(3)])  # of the two other pairs
@@ -145,7 +145,7 @@ def _askew(up: Array, down: Array, response: Array) -> str:
 
 
 def _by_face(dwells: pd.DataFrame, mapping: Mapping) -> tuple[Array, Array, Array]:
-    """Means (3, 3) with each axis up and down, and the standard error of a mean by output."""
+    """Mean outputs (3, 3) with each axis up, the same with it down, and the standard errors (3,) of a mean, output unit."""
     faces_there = {mapping.poses.get(str(label), ""): k for k, label in enumerate(dwells["pose"])}
     missing = [face for face in FACES if face not in faces_there]
     if missing or len(dwells) != len(FACES):

@@ -30,12 +30,12 @@ from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
 COVERAGE = 2.0
 _LARGE_BIAS = 0.25
-"""Bias over gravity of an output in units of acceleration, above which it is told: data sheets have 0.1 g at most."""
+"""Bias over gravity of an output in units of acceleration above which it is reported: data sheets have 0.1 g at most."""
 TEMPERATURE = "bias_temperature"
 
 
 def norm(data: Imported, mapping: Mapping) -> FitAnswer:
-    """The result of ``import --fit norm``: bias, scale and misalignment, with temperature terms if it varies by 5 °C."""
+    """The result of ``import --fit norm``: bias, scale, misalignment; with temperature terms if that varies by 5 °C."""
     dwells = imported_dwells(data)
     effects = default_model(dwells)
     answer = fitted(dwells, None, effects, gravity_of(mapping), str(data.out_unit))
@@ -59,11 +59,11 @@ class NormAnswer:
 def fitted(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float, out_unit: str
 ) -> NormAnswer:
-    """The fit of a model to dwells of unknown orientation and its verdict, with that of the first unit as text.
+    """The fit of a model to dwells of unknown orientation, and its verdict.
 
     Parameters
     ----------
-    gravity : where it was measured, g
+    gravity : local gravity, g
 
     Raises
     ------
@@ -82,7 +82,7 @@ def fitted(
 def _smaller(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float
 ) -> FittedNorms | None:
-    """The same model with orthogonal axes; None if it has no misalignment, or this is not determined."""
+    """The fit of the same model with orthogonal axes; None if the model has no misalignment, or cannot be fitted without."""
     if "misalignment" not in effects:
         return None
     try:
@@ -99,7 +99,7 @@ def _bias(done: FittedNorms) -> Array:
 
 
 def _holds_at(done: FittedNorms) -> float | None:
-    """Temperature, °C, at which values without terms in temperature hold: the mean of the first unit's dwells, if known."""
+    """Temperature, °C, at which values without temperature terms hold: the mean of the first unit's dwells; None if unknown."""
     heat = done.measured.readings.temperature
     mean = np.nan if heat is None else float(np.mean(heat[0, done.measured.readings.there[0]]))
     return mean if np.isfinite(mean) else None
@@ -188,7 +188,7 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: DiagnosisDoc
 
 
 def _noise_line(error: ErrorFigures, count: int) -> str:
-    """Noise and probability; for a long record judged by a part of its dwells also the residual of that part."""
+    """Noise and probability as text; with the residual of the judged dwells, if these are only a part of a long record."""
     recorded = error.get("white_noise_ug")
     white = "" if recorded is None else f" (white noise alone {recorded:.1f} µg)"
     judged = f"; judged by {MOST} of the dwells, residual {error['rms_ug']:.1f} µg" if count > MOST else ""

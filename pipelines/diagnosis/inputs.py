@@ -1,4 +1,4 @@
-"""Inputs of the judgement of a model: dwells with their history, a model, formulas, and dwells left out."""
+"""Inputs for the judgement of a model: dwells with their temperature history, the model, and formulas."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,11 +18,11 @@ WHY = "entered as a formula"
 
 
 def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[pd.DataFrame, pd.DataFrame | None, str]:
-    """The dwells of a file or run, their temperatures against time where there are any, and the file that these are from.
+    """The dwells of a file or run, their temperature history (None if there is none), and the file of that history (else "").
 
     Parameters
     ----------
-    history : a file; empty for the history of the run, or for the file beside a file of dwells
+    history : file of the history; empty for the history of the run, or for the file beside a file of dwells
     """
     dwells = read_dwells(source, archive=archive)
     beside = history or (file_beside(source, "history") if is_file(source) else "")
@@ -34,7 +34,7 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
 
 
 def file_beside(source: str, what: Literal["history", "fresh"]) -> str:
-    """The history or fresh run beside a file of dwells: NAME-history, or history for a file called dwells; else empty."""
+    """Path of the history or fresh run beside a file of dwells: NAME-history, or history for a file dwells; else empty."""
     dwells = Path(source)
     stems = [f"{dwells.stem}-{what}", f"{dwells.stem}_{what}"]
     if dwells.stem.endswith("dwells"):
@@ -62,7 +62,7 @@ def judged_effects(source: str, archive: str | None, listed: str, model: Path | 
 
 
 def use_written_formulas(written: Sequence[str], where: str) -> list[str]:
-    """Make formulas ``id = expression; expression`` effects of the catalogue; their ids.
+    """Add formulas ``id = expression; expression`` to the catalogue of effects; returns their ids.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def _specified(text: str, where: str) -> FormulaSpec:
 
 
 def with_formulas(text: str, formulas: Sequence[str], used: Sequence[str]) -> str:
-    """The text with the formulas that are used and that it lacks."""
+    """The text of a model file, with those formulas appended that are used and missing in it."""
     for written in formulas:
         name, _, rest = written.partition("=")
         known = name.strip().lower()

@@ -1,4 +1,4 @@
-"""The next measurement: rows of a document with purpose, station time and expected separation, and the recipe of it."""
+"""The next measurement: rows of a document with purpose, station time and expected separation, and a recipe with its steps."""
 
 import re
 from collections.abc import Sequence
@@ -29,9 +29,9 @@ BREAKER_POSE = (0.0, 0.0, 25.0)
 class Proposed:
     """The next measurements, in order: steps that separate classes of several effects, then steps that show unseen effects.
 
-    parting : classes, each with None if no steps of the station are certain to separate it
-    twins : per class, the members that no measurement of the station separates from its best member, and that member
-    showing : None if no unseen effect matters, or the station cannot show any
+    parting : classes, each with its proposal, or None if no steps of the station reliably separate it
+    twins : per class, ids of its best member and of members that no measurement of the station separates from it
+    showing : proposal for unseen effects; None if none can exceed the noise, or if the station cannot show any
     """
 
     parting: tuple[tuple[EffectClass, Proposal | None], ...] = ()
@@ -57,18 +57,18 @@ class Proposed:
 
 
 def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Proposed:
-    """The next measurements after a diagnosis, each one planned after the ones before.
+    """The next measurements after a diagnosis, each planned to follow those before it.
 
     Parameters
     ----------
-    around : capabilities of the station; those that the run shows if None
+    around : capabilities of the station; those that the run implies if None
     """
     parting: list[tuple[EffectClass, Proposal | None]] = []
     already: list[SequenceStep] = []
     twin: list[tuple[str, ...]] = []
     for named in (*diagnosis.handled, *diagnosis.named):
         if len(named.effects.members) > 1:
-            # more poses do not separate handling errors from effects; the text of the handling error says what does
+            # more poses do not separate handling errors from effects; the handling error's ``breaker`` says what does
             measurement, twin_ids = None, ()
             if not named.effects.of_data:
                 with suppress(MissingInput):  # a quantity that the run did not record
@@ -82,7 +82,7 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
 
 
 def _breaker(group: EffectClass) -> NextMeasurement:
-    """A row without steps that states what separates a class which no steps of the station separate."""
+    """A row without steps, for a class that no steps of the station separate: it states what would."""
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
     steps = "" if group.of_data else "no steps of the station are certain to separate them; needed:  "
@@ -96,7 +96,7 @@ def _without_steps(why: str) -> NextMeasurement:
 
 
 def rows_of(suggestion: Proposal) -> list[NextMeasurement]:
-    """Rows of one proposal: consecutive equal steps are one row with their number."""
+    """Rows of one proposal; consecutive equal steps are one row with the number of repeats."""
     rows: list[NextMeasurement] = []
     before: NextMeasurement | None = None
     about = " | ".join(suggestion.pair) or f"{UNSEEN}{', '.join(suggestion.ids)}"
@@ -135,15 +135,15 @@ SAME_SOAK_K = 0.5
 
 
 def next_recipe(base: Recipe, rows: Sequence[NextMeasurement], name: str) -> Recipe:
-    """The recipe ``base`` followed by the proposed steps; its model is that of ``base``.
+    """The recipe ``base`` with the proposed steps appended; its model is that of ``base``.
 
-    The proposed steps alone have too few poses for a fit, and their expected χ² includes the dwells so far: both are measured. A
-    recipe file holds no formulas: those of a model file are left out.
+    The steps of ``base`` are measured again, because the proposed ones alone have too few poses for a fit, and their expected χ²
+    includes the earlier dwells. A recipe file has no formulas: those of a model file are left out.
 
     Parameters
     ----------
     rows : ``next_measurements`` of a diagnosis; rows that are not measurable are left out
-    name : of the recipe
+    name : name of the new recipe
 
     Raises
     ------
@@ -186,7 +186,7 @@ def reasons(rows: Sequence[NextMeasurement]) -> list[str]:
 
 
 def _explicit(base: Recipe, soak: int) -> dict[str, Any]:
-    """A soak of the recipe with the numbers of its poses: "all poses" would include the added ones."""
+    """A soak of the recipe with its poses listed by number, because "all poses" would include the added ones."""
     given = base.soaks[soak] if base.soaks else SoakPart(temperature_C=base.temperatures_C[soak])
     listed = given.poses if given.poses is not None else range(1, len(base.poses) + 1)
     return {
@@ -215,7 +215,7 @@ def _soak_for(soaks: list[dict[str, Any]], row: NextMeasurement) -> dict[str, An
 
 
 def _tidied(part: dict[str, Any], base: Recipe) -> dict[str, Any]:
-    """A soak without ``waits_s`` and ``off_s`` that only repeat what the recipe ``base`` has anyway."""
+    """A soak without ``waits_s`` and ``off_s`` if these equal the defaults of the recipe ``base``."""
     tidied = dict(part)
     if all(wait == base.settle_s for wait in part["waits_s"]):
         tidied["waits_s"] = None

@@ -37,10 +37,10 @@ BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""
 
 _ALIKE = 0.5
-"""Share of the variance of the residuals that is common to all units, from which on a notice says so."""
+"""Share of the residual variance common to all units from which on a notice is given."""
 
 _ACROSS, _ALONG = 0.3, 0.9
-"""Forces along the axis, g, below and above which its noise is compared."""
+"""Forces along the axis, g, below and above which the noise of its dwells is averaged for comparison."""
 
 
 @dataclass(frozen=True)
@@ -74,16 +74,16 @@ def classes_of(diagnosis: Diagnosis, names: Names) -> list[EffectClassDocument]:
 
 
 def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
-    """Nonlinear parameters of the named effects as ``compare`` has them for the model with all of these, with their intervals.
+    """Nonlinear parameters and intervals of the named effects, as ``compare`` gives them for the model with all of these.
 
-    A search has them at its own noise and beside other terms: one value under one name needs one estimate.
+    The values of the search differ, because it estimates them at another noise and beside other terms.
     """
     added = [n.effects.proposed for n in diagnosis.named if not n.effects.of_data]
     if not any(term.values for term in added):
         return {}
     known = catalogue.catalogue()
     judged = [t.effect.id for t in diagnosis.base.terms if t.effect.id in known or ":" in t.effect.id]
-    problem = diagnosis.problem  # its columns and the whiteners of its noise are known
+    problem = diagnosis.problem  # reuses its stored columns and whiteners
     ids = dict.fromkeys([*judged, *(term.effect.id for term in added)])
     model = settled(Model(problem, terms_of(catalogue.get_all(list(ids)), problem)))
     between = intervals(model)
@@ -139,7 +139,7 @@ def _bad_dwell(diagnosis: Diagnosis, bad: BadDwell, names: Names) -> EffectClass
 
 
 def in_part_of(diagnosis: Diagnosis) -> list[UnseenInPart]:
-    """Effects that the plan cannot see at some values of their nonlinear parameters, one row a range."""
+    """Effects that the plan cannot show at some values of their nonlinear parameters, one row per range."""
     return [
         {
             "effect": name,
@@ -156,7 +156,7 @@ def in_part_of(diagnosis: Diagnosis) -> list[UnseenInPart]:
 
 
 def smallest_of(diagnosis: Diagnosis) -> list[SmallestNamed]:
-    """Smallest detected sizes of effects, those that slow noise hides most first."""
+    """Smallest detectable sizes of effects, effects hidden most by slow noise first."""
     return [
         {"effect": s.effect, "size_ug": MICRO * s.size, "without_slow_noise_ug": MICRO * s.without_slow}
         for s in diagnosis.smallest
@@ -164,7 +164,7 @@ def smallest_of(diagnosis: Diagnosis) -> list[SmallestNamed]:
 
 
 def evidence_of(diagnosis: Diagnosis, names: Names) -> VerdictEvidence:
-    """The basis of the verdict: degrees of freedom, condition, the bias without single dwells, the smallest cubic detected."""
+    """The basis of the verdict: degrees of freedom, condition number, jackknife of the bias, smallest detectable cubic term."""
     evidence = diagnosis.evidence
     largest: StudentisedDwell | None = None
     if evidence.largest is not None:
@@ -186,7 +186,7 @@ def _micro(value: float | None) -> float | None:
 
 
 def white_noise_of(model: Model) -> float | None:
-    """RMS of the white noise of the dwell means by their samples, sd/√n, µg; None if not recorded."""
+    """RMS of the white noise of the dwell means from their samples, sd/√n, µg; None if not recorded."""
     error = model.problem.error
     finite = error[np.isfinite(error)]
     lot = model.problem.lot
@@ -207,7 +207,7 @@ def leave_out_of(diagnosis: Diagnosis, names: Names) -> LeaveOut | None:
 
 
 def influence_of(diagnosis: Diagnosis, names: Names) -> list[InfluentialDwell]:
-    """Dwells by influence on the verdict, largest first; dwells left out have all of it."""
+    """Dwells by influence on the verdict, largest first; a dwell left out as bad has a share of 1."""
     single = [d for d in diagnosis.removed if not d.tail]
     rows: list[InfluentialDwell] = [{**names.at(d.unit, d.dwell), "share": 1.0} for d in single]
     if rows and not (diagnosis.named or diagnosis.handled):
@@ -245,7 +245,7 @@ def removed_of(diagnosis: Diagnosis, names: Names) -> RemovedDwells | None:
 
 
 def noise_of(model: Model) -> NoiseFigures:
-    """The estimated noise: shares of 1/f and random walk over the white variance, and the ratio between units and axes."""
+    """The estimated noise: shares of 1/f noise and random walk, and the ratio of the largest to the smallest scale of a block."""
     noise = model.noise
     return {
         "wander_share": float(noise.shares.flicker),
@@ -255,7 +255,7 @@ def noise_of(model: Model) -> NoiseFigures:
 
 
 def noise_along(run: ExaminedRun) -> list[str]:
-    """A notice where the white noise depends on the force along the axis, with how much."""
+    """A notice with the ratio, if the white noise depends on the force along the axis; else empty."""
     if run.louder is None:
         return []
     force = np.broadcast_to(run.lot.state.force, (*run.louder.shape[:2], 3))[..., list(run.lot.state.axes)]
@@ -276,23 +276,23 @@ def noise_along(run: ExaminedRun) -> list[str]:
 
 
 def noise_of_the_lot(model: Model, units: int) -> list[str]:
-    """A notice where the variance of the residuals is, for the greater part, common to all units."""
+    """A notice if most of the residual variance is common to all units; else empty."""
     common = correlation_of_units(model)
     if common < _ALIKE:
         return []
     shared, single = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (common, 1.0 - common))
-    text = f"of what remains {shared} µg are alike in all {units} units, {single} µg are each unit's own"
-    return [f"{text}: look for the cause in what they share, such as table, fixture, reference or supply"]
+    text = f"{shared} µg of the residual are common to all {units} units, {single} µg differ between them"
+    return [f"{text}: look for a cause that they share, such as table, fixture, reference or supply"]
 
 
 def _plausible(size: float, typical: tuple[float, float]) -> bool:
-    """Whether a size in g is in the usual range of the effect, or down to a tenth of it."""
-    # the size of an effect within the noise is not judged
+    """Whether a size, g, is in the usual range of the effect, extended downwards by a factor of ten."""
+    # a size of zero (within the noise) is not judged
     return size <= 0.0 or 0.1 * typical[0] <= MICRO * size <= typical[1]
 
 
 def suspected_of(diagnosis: Diagnosis) -> SuspectedEffects | None:
-    """What a model that fails without a named cause lacks most probably; None where nothing is suspected."""
+    """The most probable missing effects of a model that fails without a named cause; None if there are none."""
     suspected = diagnosis.suspected
     if suspected is None:
         return None

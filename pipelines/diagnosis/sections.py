@@ -1,4 +1,4 @@
-"""The tables of a diagnosis with their sentences, the same at a terminal, in a report and on a page."""
+"""The tables of a diagnosis with their sentences, shared by terminal, report and page."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -20,12 +20,12 @@ DRIVERS = 8
 """Drivers of the residual that a terminal lists."""
 
 Number = tuple[str, str]
-"""A column of numbers: its name and their unit, empty for a number without one. A column of text is its name alone."""
+"""Heading of a column of numbers: name and unit, "" for numbers without a unit. That of a column of text is a name alone."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """A table with its title, and the sentences under it; without rows there may still be sentences."""
+    """A table with its title, and the sentences below it, which may exist without rows."""
 
     title: str
     columns: tuple[str | Number, ...]
@@ -55,7 +55,7 @@ def _numbers(dwells: list[int]) -> str:
 
 
 def drivers(document: DiagnosisDocument, most: int | None = DRIVERS) -> Section:
-    """The recorded quantities that the residual follows, ``most`` of them, all where None."""
+    """The recorded quantities that the residual depends on, at most ``most`` of them; all if None."""
     rows = [
         [p["driver"], " ".join(p["axes"]), f"{100.0 * p['share']:.0f} %", chance(p["p_value"])]
         for p in document["where"][:most]
@@ -123,7 +123,7 @@ def _within(interval: Sequence[float] | None) -> str:
 
 
 def next_measurement(proposed: Sequence[NextMeasurement]) -> Section:
-    """The next measurement step by step, with station time and expected separation, and what no steps separate."""
+    """The next measurement step by step, with station time, expected separation, and classes that no steps separate."""
     steps = [p for p in proposed if p.get("measurable", True)]
     rows = [
         [
@@ -147,7 +147,7 @@ def unseen(document: DiagnosisDocument, *, brief: bool = False) -> Section:
 
     Parameters
     ----------
-    brief : one sentence counts those of quantities that were not recorded
+    brief : whether effects of quantities that were not recorded are only counted, in one sentence
     """
     reasons = document.get("reasons", {})
     rows = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
@@ -177,7 +177,7 @@ def unseen_in_part(document: DiagnosisDocument) -> Section:
 
 
 def hidden_by_noise(document: DiagnosisDocument) -> Section:
-    """The effects that 1/f noise or random walk of this size hides, with the measurement for smaller sizes."""
+    """Effects whose smallest detectable size 1/f noise or random walk raises most, with the measurement for smaller sizes."""
     named = document.get("smallest_named", ())
     raised = [row for row in named if row["size_ug"] > HIDDEN * row["without_slow_noise_ug"]][:SHOWN]
     rows = [

@@ -113,13 +113,13 @@ def evidence_text(document: DiagnosisDocument) -> str:
 
 
 def few_dwells(document: DiagnosisDocument) -> bool:
-    """Whether an adequate model was judged by so few dwells that the smallest detected effect has to be told."""
+    """Whether an adequate model was judged by so few dwells that the smallest detectable effect must be stated."""
     evidence = document.get("evidence")
     return bool(document["adequate"] and evidence and evidence["degrees_of_freedom"] < FEW_DOF)
 
 
 def undetected(document: DiagnosisDocument) -> str:
-    """The smallest cubic term that the dwells show; empty without a verdict."""
+    """The smallest cubic term that the dwells detect; empty without a verdict."""
     evidence = document.get("evidence")
     if not evidence:
         return ""
@@ -174,7 +174,7 @@ def without_single_dwells(document: DiagnosisDocument) -> str:
 
 
 def tails_left_out(document: DiagnosisDocument) -> str:
-    """The dwells that were left out and that the tails of the noise may explain; empty where there are none."""
+    """The dwells that were left out but that the tails of the noise may explain; empty if there are none."""
     removed = document.get("removed")
     if not removed or not removed["heavy_tails"]:
         return ""
@@ -197,7 +197,7 @@ def left_out(document: DiagnosisDocument) -> list[str]:
 
 
 def why_recommended(document: DiagnosisDocument) -> list[str]:
-    """Why effects that are named are not recommended for the model, or are by their evidence alone."""
+    """Reasons why named effects are not recommended for the model, or are recommended by their evidence alone."""
     lines: list[str] = []
     for group in document["classes"]:
         if group["scope"] == "data":
@@ -229,7 +229,7 @@ def not_listed(document: DiagnosisDocument) -> str:
 
 
 def unexplained_text(document: DiagnosisDocument) -> str:
-    """The quantity that the residual follows without an effect of the catalogue that explains it; empty where there is none."""
+    """The quantity that the residual depends on without an effect that explains it; empty if there is none."""
     unexplained = document["unexplained"]
     if not unexplained:
         return ""
@@ -239,7 +239,7 @@ def unexplained_text(document: DiagnosisDocument) -> str:
 
 
 def suspected_text(document: DiagnosisDocument) -> str:
-    """What the model lacks most probably where nothing is named, and what decides it; empty where nothing is suspected."""
+    """The most probable missing effects if none is named, and the measurement that decides; empty if none is suspected."""
     suspected = document.get("suspected")
     if not suspected:
         return ""
@@ -251,7 +251,7 @@ def suspected_text(document: DiagnosisDocument) -> str:
 
 
 def not_recorded(reason: str) -> str:
-    """The column that the dwells lack by a reason of :mod:`inertial.planning.reasons`; empty for another reason."""
+    """The missing column that a reason of :mod:`inertial.planning.reasons` names; empty for another reason."""
     match = _NOT_RECORDED.match(reason)
     return "" if match is None else match[1]
 

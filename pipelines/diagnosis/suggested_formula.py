@@ -1,4 +1,4 @@
-"""The suggestion if a driver explains the excess and no effect of the catalogue does: a formula for a model file."""
+"""A formula for a model file, suggested if a driver explains the excess residual and no effect of the catalogue does."""
 
 import numpy as np
 
@@ -17,21 +17,21 @@ _PARTS = {
 
 
 def what_follows(unexplained: Unexplained) -> str:
-    """The part of the output that follows the driver, as text."""
+    """A text that names the property of the output and the driver that it depends on."""
     verb = "follow" if unexplained.part == "axes" else "follows"
     swing = "" if unexplained.period is None else f" with a period of {unexplained.period / 60.0:.3g} min"
     return f"{_PARTS[unexplained.part]} {verb} {unexplained.driver}{swing}"
 
 
 def offer(unexplained: Unexplained, state: State) -> SuggestedFormula | None:
-    """A formula that follows the driver: a line, a swing, or a cubic about the middle of its range; None where no quantity is it.
+    """A formula of the driver: a line, an oscillation, or a cubic about mid-range; None if the driver is not a single quantity.
 
-    Of the scale factor and the axes it is times the forces along and across the axis; of the transfer curve the quantity is times
-    the square and the cube of the force.
+    For the scale factor and the axes it is multiplied by the forces along and across the axis; for the transfer curve the scaled
+    driver is multiplied by the square and the cube of the force.
 
     Parameters
     ----------
-    unexplained : of a diagnosis
+    unexplained : the unexplained driver of a diagnosis
     state : its dwells
     """
     name = formula_name(unexplained.driver)
@@ -67,7 +67,7 @@ def _values(name: str, state: State) -> np.ndarray | None:
 
 
 def _cubic(name: str, values: np.ndarray) -> list[str]:
-    """Powers of the quantity scaled to about −1 … 1: unscaled powers would be nearly collinear."""
+    """The quantity, and powers of it scaled to about −1 … 1, because unscaled powers would be nearly collinear."""
     scaled = _scaled(name, values)
     return [name, f"{scaled}**2", f"{scaled}**3"]
 

@@ -1,4 +1,4 @@
-"""The alarms of an archive with what is known of them: effect, day, evidence now, and the columns that they are about."""
+"""The alarms of an archive, with the effect, day and present evidence of each, and the columns of all effects."""
 
 from functools import cached_property
 
@@ -24,13 +24,13 @@ class Alarms:
 
     @cached_property
     def of_thermometer(self) -> list[Alarm]:
-        """Alarms of what is proportional to a unit's own temperature coefficient, the strongest first."""
+        """Alarms of effects proportional to a unit's own temperature coefficient, the strongest first."""
         alarms = (alarm for alarm in self.open_alarms if plain(alarm.driver) == OWN_TEMPCO)
         return sorted(alarms, key=lambda alarm: -self.log_e(alarm))
 
     @cached_property
     def pool(self) -> Pool:
-        """The columns and their products, means over the archive."""
+        """The columns of all effects and their products, averaged over the runs of the archive."""
         columns, k = self.state.columns, len(self.state.columns)
         index = {column: at for at, column in enumerate(columns)}
         lot, inside, size = np.zeros((AXES * k, AXES * k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))

@@ -20,19 +20,19 @@ from schemas.errors import WrongUse, close_matches, did_you_mean
 By = Literal["serial", "run"]
 
 NOT_DRIVERS = {"grade", "outcome", "pass", "passed", "fail", "failed", "yield", "certificate"}
-"""Columns that follow from the result: units selected by them would show an effect where there is none."""
+"""Columns derived from the calibration result: as drivers they would show effects that do not exist (selection bias)."""
 
 _SHOWN = 5
 _DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 
 def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -> AddedAttributes:
-    """Add a table of attributes to an archive: a column ``serial`` (or ``unit``) or ``run``, and one for each attribute.
+    """Add a table of attributes to an archive, with a key column ``serial`` (or ``unit``) or ``run``; returns the counts.
 
     Raises
     ------
     WrongUse
-        The key is missing, empty or twice with different values, or no attribute is left.
+        The key is missing, empty or has conflicting values, or no column of an attribute is left.
     """
     archive.refuse_none()
     key = _key_column(table, by, source)
@@ -70,7 +70,7 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
 
 
 def as_numbers(values: Sequence[str]) -> dict[str, float] | None:
-    """The values as numbers where they are a quantity: dates as days, or numbers of which some have a fraction; else None."""
+    """Numbers by text if the values are a quantity (dates, as days; or numbers, some with a fraction); None for labels."""
     present = {value for value in values if value}
     if present and all(_DAY.fullmatch(value) for value in present):
         return {value: float(np.datetime64(value, "D").astype(float)) for value in present}
@@ -83,7 +83,7 @@ def as_numbers(values: Sequence[str]) -> dict[str, float] | None:
 
 
 def _append(archive: Archive, content: Mapping[str, Any]) -> str:
-    """Write the next file of attributes and return its name; a second process waits."""
+    """Write the next file of attributes, under a lock, and return its name."""
     with alone(archive.root / FOLDER, wait=True):
         path = archive.root / FOLDER / f"{len(attribute_files(archive)) + 1:06d}.json"
         files.publish(path, files.manifest_bytes(content))
@@ -103,7 +103,7 @@ def _key_column(table: pd.DataFrame, by: By, source: str) -> str:
 
 
 def _values(table: pd.DataFrame, key: str, names: list[str], source: str) -> dict[str, dict[str, str]]:
-    """The values by key, as text; empty cells say nothing."""
+    """The values as text by key and attribute, without empty cells."""
     out: dict[str, dict[str, str]] = {}
     for row in table.to_dict("records"):
         subject = _text(row[key])
@@ -125,7 +125,7 @@ def _values(table: pd.DataFrame, key: str, names: list[str], source: str) -> dic
 
 
 def _text(value: object) -> str:
-    """A cell as text: whole numbers without a point, nothing for an empty one."""
+    """A cell as text: integers without a decimal point, empty for a missing value."""
     if value is None or value is pd.NaT or (isinstance(value, float) and math.isnan(value)):
         return ""
     if isinstance(value, (float, np.floating)) and float(value).is_integer():
@@ -151,12 +151,12 @@ _EXAMPLES = 4
 
 
 def added_from(archive: Archive, path: Path, by: str) -> tuple[AddedAttributes, list[str]]:
-    """Add the attributes of a file to an archive; the counts, and sentences that state them.
+    """Add the attributes of a file to an archive; returns the counts and sentences about them.
 
     Raises
     ------
     WrongUse
-        The file is none, or not a table.
+        The file is missing or not a table.
     """
     if by not in {"serial", "run"}:
         raise WrongUse(f"attributes: --by is '{by}', serial or run is needed")
@@ -176,7 +176,7 @@ def added_from(archive: Archive, path: Path, by: str) -> tuple[AddedAttributes, 
 
 
 def listed(archive: Archive) -> ListedAttributes:
-    """Every attribute: of units or runs, for how many it is known, how many levels it has, some of them."""
+    """Every attribute of units and of runs, with the number of known values, the number of levels, and examples."""
     known = known_attributes(archive)
     rows: list[KnownAttribute] = []
     for kind, by_key in (("units", known.serial), ("runs", known.run)):

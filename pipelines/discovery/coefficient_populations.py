@@ -1,4 +1,4 @@
-"""Findings on the coefficients of many units: two populations in one of them, and pairs that correlate."""
+"""Findings on the coefficients of many units: coefficients with two populations, and correlated pairs."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -21,7 +21,7 @@ _SEED = 20
 
 
 def populations(archive: Archive, device: str, workers: int = 1) -> list[PopulationRow]:
-    """Coefficients whose units are two populations, and pairs that correlate: each unit once, by its first calibration."""
+    """Coefficients with two populations of units, and correlated pairs; each unit counts once, by its first calibration."""
     index = up_to_date(archive, workers=workers)
     runs = first_runs(index, dated_runs(index), np.inf)
     calibrations = load(index, runs)
@@ -43,7 +43,7 @@ def populations(archive: Archive, device: str, workers: int = 1) -> list[Populat
 
 
 def _first_calibrations(archive: Archive, runs: list[str]) -> Iterator[Calibration]:
-    """The calibrations of runs, each unit once; a run whose files cannot be read is left to ``verify``."""
+    """The calibrations of runs, each unit once; runs with unreadable files are skipped (``verify`` reports them)."""
     seen: set[str] = set()
     for name in runs:
         run = Run(archive, name)
@@ -60,11 +60,11 @@ def _first_calibrations(archive: Archive, runs: list[str]) -> Iterator[Calibrati
 
 
 def correlations(calibrations: Iterable[Calibration]) -> list[PopulationRow]:
-    """Pairs of coefficients that correlate, for each model of which there are enough lots."""
+    """Correlated pairs of coefficients, for each model with enough lots."""
     of_model: dict[tuple[tuple[str, ...], tuple[int, ...]], Correlations] = {}
     for made in calibrations:
         sums = of_model.setdefault((made.effects, made.axes), Correlations())
-        if not made.nonlinear:  # else a coefficient means another thing in each lot
+        if not made.nonlinear:  # with fitted nonlinear parameters the meaning of a coefficient differs between lots
             sums.add(made.coefficients, made.covariance)
     rows: list[PopulationRow] = []
     for (model, axes), sums in of_model.items():

@@ -1,4 +1,4 @@
-"""The demonstration of discoveries: a simulated line has something hidden in a wafer; it is found, added, confirmed."""
+"""The demonstration of discoveries: an effect hidden in one wafer of a simulated line is found, and added to the model."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +17,7 @@ HARDENING = 12e-6  # 1/g²: the output of 1 g falls behind by 12 µg; what a lot
 
 
 def made(folder: Path, seed: int, lots: int, progress: Callable[[int], None]) -> tuple[DemoArchive, Hidden]:
-    """Write the archive of a line in a new folder; what is hidden in it.
+    """Write the archive of a simulated line to a new folder; returns it with the hidden effect.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def made(folder: Path, seed: int, lots: int, progress: Callable[[int], None]) ->
 
 
 def played(made_: DemoArchive, hidden: Hidden, workers: int, seed: int) -> DiscoveryDemo:
-    """The story as one document: what was found on which night, and what adding it does to the archive."""
+    """The demonstration as a document: the discoveries, and the archive with the found effect in the model of every lot."""
     archive = Archive(str(made_.folder))
     added_from(archive, made_.units, "serial")
     first = discovered(archive, Look(workers=workers)).document

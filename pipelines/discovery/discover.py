@@ -1,4 +1,4 @@
-"""One look at an archive: new runs are scored, the night's evidence is kept, and what is beyond chance is named."""
+"""One evaluation of an archive: new runs are scored, their evidence is stored, and significant effects are named."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ from schemas.units import MICRO
 
 @dataclass(frozen=True)
 class Look:
-    """The options of a look at an archive.
+    """The options of an evaluation of an archive.
 
-    device : kind of device; that of most runs if empty · since : only lots from this day on; nothing is kept then
-    drivers : only discoveries of these; all if empty · effects : in the model of every lot beside its own
-    looking_back : judge all lots again with every attribute that is known now; nothing is kept then
-    populations : look for two populations in each coefficient, and for coefficients that correlate
-    explained : one discovery is asked for; what is new is for the next look to tell
+    device : kind of device; that of most runs if empty · since : only lots from this day on; the result is not stored
+    drivers : report only discoveries by these; all if empty · effects : ids added to the model of every lot
+    looking_back : judge all lots again with all attributes known now; the result is not stored
+    populations : search for two populations in each coefficient, and for correlated coefficients
+    explained : a single discovery is requested; new ones are then left for the next evaluation to report
     workers, distribute : processes, or other machines, that score new runs
     """
 
@@ -61,7 +61,7 @@ def discovered(archive: Archive, look: Look) -> Looked:
     """
     with threadpool_limits(1):
         source = DiscoveryArchive(archive, look.device)
-        source.device  # noqa: B018 - a wrong name is refused before anything is scored
+        source.device  # noqa: B018 - refuses an unknown name before any run is scored
         source.score(look.workers, look.distribute)
         state = brought_up(source)
         findings = Findings(source, state)
@@ -80,6 +80,7 @@ def discovered(archive: Archive, look: Look) -> Looked:
 
 
 def _in_memory(source: DiscoveryArchive, look: Look) -> Findings:
+    """Findings of the lots since a day, with the attributes known now; nothing is stored."""
     known = (run for run in source.pooled() if run not in source.revoked)
     runs = [run for run in known if str(source.store.head(run)["when"])[:10] >= look.since]
     if not runs:
@@ -90,7 +91,7 @@ def _in_memory(source: DiscoveryArchive, look: Look) -> Findings:
 def _with_effects(
     source: DiscoveryArchive, before: Findings, document: DiscoverDocument, effects: Sequence[str]
 ) -> tuple[Findings, DiscoverDocument]:
-    """The same lots with effects in the model of each, and what is left of every discovery."""
+    """Findings with effects added to the model of every lot, and the document that compares every discovery with before."""
     catalogue.get_all(effects)
     pool = before.pool
     added = [effect for effect in effects if effect in pool.effects]
@@ -115,7 +116,7 @@ def _compared(row: DiscoveryRow, before: Findings, after: Findings) -> ComparedA
         "log_e_before": round(_largest(before, row), 2),
         "log_e_after": round(_largest(after, row), 2),
         "size_ug_before": row["size_ug"],
-        # of the largest effect that is still named for the driver
+        # size of the largest effect that is still named for the driver
         "size_ug_after": next(
             (
                 MICRO * size_of(discovery.name)[0]
@@ -128,13 +129,14 @@ def _compared(row: DiscoveryRow, before: Findings, after: Findings) -> ComparedA
 
 
 def _largest(findings: Findings, row: DiscoveryRow) -> float:
-    """The largest evidence of a driver for any effect."""
+    """The largest log evidence of a discovery's driver over all effects."""
     drivers = findings.state.sensor.drivers
     values = [float(sums.log_e.max()) for name, sums in drivers.items() if name.removesuffix(INSIDE) == row["driver"]]
     return max(values, default=0.0)
 
 
 def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverDocument:
+    """The document restricted to some drivers."""
     known = [row["name"] for row in document["drivers"]]
     for driver in drivers:
         if known and driver not in known:
@@ -149,12 +151,12 @@ def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverD
 
 
 def explained(document: DiscoverDocument, name: str) -> DiscoveryRow | UnexplainedRow:
-    """One discovery by its id, or what is unexplained.
+    """The discovery or unexplained dependence of an id.
 
     Raises
     ------
     WrongUse
-        There is none of that id.
+        There is none with that id.
     """
     rows = [*document["discoveries"], *document["unexplained"]]
     found = next((row for row in rows if row["id"].lower() == name.lower()), None)

@@ -25,19 +25,19 @@ PooledLots = TypedDict(
 
 
 class ErrorControl(TypedDict):
-    """What a discovery has to reach."""
+    """The threshold of a discovery."""
 
-    alpha: Annotated[float, "probability that an archive without anything hidden ever shows one"]
+    alpha: Annotated[float, "probability that an archive without any hidden effect ever shows a discovery"]
     hypotheses: int
     log_e_needed: Annotated[float | None, "natural logarithm of the evidence; null: no lot can be used"]
-    valid: Annotated[str, "when it may be looked at: every night"]
+    valid: Annotated[str, "when the evidence may be evaluated: every night"]
 
 
 class DiscoveredLevel(TypedDict):
     """One level of a driver."""
 
     level: str
-    size_ug: Annotated[float, "of the axis with the largest one, signed"]
+    size_ug: Annotated[float, "signed, on the axis with the largest differences"]
     u_ug: Annotated[float, "one standard error"]
     units: int
 
@@ -45,7 +45,7 @@ class DiscoveredLevel(TypedDict):
 class CarriedBy(TypedDict):
     """How the lots share the evidence."""
 
-    lots_for: Annotated[float | None, "share of the lots that speak for it; null: of a column of the station"]
+    lots_for: Annotated[float | None, "share of the lots that support it; null: an error of the station"]
     log_e_without_largest_2_percent: float | None
 
 
@@ -55,7 +55,7 @@ class DiscoveryRow(TypedDict):
     id: str
     since: Annotated[str, "day of the first night on which it was beyond the threshold"]
     lots_then: int
-    effects: Annotated[list[str], "class of effects that the lots do not tell apart, best first"]
+    effects: Annotated[list[str], "class of effects that the lots cannot separate, best first"]
     recommended: str
     axes: list[str]
     driver: str
@@ -89,15 +89,17 @@ class HeldAlarm(TypedDict):
 class UnexplainedRow(TypedDict):
     """Evidence by a driver that no effect of the catalogue accounts for: a discovery without a name."""
 
-    id: Annotated[str, "as of a discovery, which it becomes when an effect turns out to be it"]
+    id: Annotated[str, "as of a discovery, which keeps it if an effect is identified later"]
     since: Annotated[str, "day of the first night on which it was beyond the threshold"]
     lots_then: int
     driver: str
-    level: Annotated[str, "of the driver, which the map is of: the one that departs most; empty where it has none"]
+    level: Annotated[
+        str, "level of the driver with the largest dependence, shown by the map; empty: the driver has none"
+    ]
     axes: list[str]
     map: Annotated[
         list[list[float]],
-        "outer and inner angle in degrees, what is left and its standard error in µg; empty: no function of the pose",
+        "outer and inner angle in degrees, the residual and its standard error in µg; empty: no dependence on pose",
     ]
     log_e: float
     nearest: Annotated[str, "the effect with the largest evidence"]
@@ -113,7 +115,7 @@ class PopulationRow(TypedDict):
 
 
 class ReachRow(TypedDict):
-    """What the archive could have seen."""
+    """The smallest effect that the archive would have shown."""
 
     effect: str
     driver: Annotated[str, "mean, or inside lots"]
@@ -122,7 +124,7 @@ class ReachRow(TypedDict):
 
 
 class UntoldEffect(TypedDict):
-    """An effect that no lot tells from the station's own errors."""
+    """An effect that no lot can separate from errors of the station."""
 
     effect: str
     reason: str
@@ -148,7 +150,7 @@ class ComparedAlarm(TypedDict):
 
 
 class DiscoverDocument(TypedDict):
-    """``discover --json``: what the lots of an archive show together."""
+    """``discover --json``: the effects that the lots of an archive show together."""
 
     pooled: PooledLots
     model: list[str]
@@ -159,7 +161,7 @@ class DiscoverDocument(TypedDict):
     unexplained: Annotated[list[UnexplainedRow], "evidence that no effect of the catalogue accounts for"]
     population: Annotated[
         list[PopulationRow],
-        "with --populations: coefficients whose units are two populations, and pairs that correlate",
+        "with --populations: coefficients with two populations of units, and correlated pairs",
     ]
     reach: list[ReachRow]
     unseen: list[UntoldEffect]
@@ -169,7 +171,7 @@ class DiscoverDocument(TypedDict):
         list[ComparedAlarm],
         "with --model: discoveries of the sensors before and after its effects are in every lot's model",
     ]
-    new: Annotated[list[str], "ids of discoveries, and of what is unexplained, that were not there the time before"]
+    new: Annotated[list[str], "ids of discoveries and unexplained dependences that are new since the last evaluation"]
     looking_back: bool
 
 
@@ -212,7 +214,7 @@ class ListedAttributes(TypedDict):
 
 
 class HiddenInWafer(TypedDict):
-    """What a demonstration hid."""
+    """The effect that a demonstration hid."""
 
     wafer: str
     physics: str

@@ -1,4 +1,4 @@
-"""The evidence of a kind of device after some nights, its alarms, and its file."""
+"""The evidence of a kind of device after some evaluations (nights), its alarms, and the file that stores it."""
 
 import io
 from collections import Counter
@@ -16,23 +16,24 @@ from pipelines.archive.store import Place
 from pipelines.discovery.lot_source import AXES, Column, DiscoveryArchive
 
 ALPHA = 0.05
-"""Probability that an archive without anything hidden ever shows a discovery, over its whole life."""
+"""Probability of any false discovery over the complete life of an archive."""
 
 STATION_DRIVERS = {MEAN, STATION, "date"}
 """Drivers of the station's own columns."""
 
 _MOST_COLUMNS = 5
-"""Of an effect that is judged as a whole. A bad lot displaces the past of all columns at once, by a little: in a sum over the 63
-of any function of the pose that made 6 of 47 archives false, with one lot in a hundred of twenty times the noise."""
+"""Largest number of columns of an effect that is also judged by all its columns together. A bad lot shifts the predictions of all
+columns a little: summed over the 63 of any function of pose, that caused false discoveries in 6 of 47 archives in which one lot
+in a hundred had twenty times the noise."""
 
-_LAYOUT = 2  # of the state on disk
+_LAYOUT = 2  # version of the state file
 
 
 @dataclass(frozen=True)
 class Alarm:
-    """Evidence beyond the threshold: driver, index of the hypothesis, night of the first time.
+    """Evidence beyond the threshold: driver, index of the hypothesis, first night, number of lots then, log evidence then.
 
-    index : axes × columns of the sensor, then its effects as wholes, then columns of the station
+    index : axes × columns of the sensor, then its effects with all columns, then columns of the station
     """
 
     driver: str
@@ -46,9 +47,9 @@ class Alarm:
 class Evidences:
     """Evidence of a kind of device after some nights.
 
-    columns : of the sensor, in the order of the hypotheses of one axis · of_station : of the station
+    columns : columns of the sensor, in the order of the hypotheses of one axis · of_station : columns of the station
     sensor, station : evidence · order : runs in the order of arrival · taken_out : runs that no longer count
-    generations : when each driver came in: later ones have less of the probability of an error
+    generations : index of the night that added each driver; later ones share a smaller error probability
     """
 
     device: str
@@ -63,16 +64,16 @@ class Evidences:
     night: int = 0
 
     def unknown(self, alarms: Iterable[Alarm]) -> list[Alarm]:
-        """Alarms for hypotheses that have none yet."""
+        """The alarms for hypotheses without an earlier alarm."""
         known = {(alarm.driver, alarm.index) for alarm in self.alarms}
         return [alarm for alarm in alarms if (alarm.driver, alarm.index) not in known]
 
     def needed(self, driver: str, *, of_station: bool = False) -> Array:
-        """Logarithm of the evidence from which on each hypothesis of a driver counts.
+        """Threshold of the log evidence of each hypothesis of a driver, (hypotheses,).
 
-        The drivers of a generation share its probability of an error equally, and so do the effects of a driver: half of it is
-        the effect's as a whole, half that of its columns on each axis. An effect of many columns, as any function of the pose,
-        takes no more from the others than one of a single column; as a whole it never counts.
+        The drivers of a generation share its error probability equally, and so do the effects of a driver: half of an effect's
+        share is for all its columns together, half for its single columns and axes. An effect of many columns, as any function
+        of pose, gets no larger share than one with a single column, and is not judged by all its columns together.
         """
         generation = self.generations.get(driver, 0)
         drivers = (Counter(self.generations.values())[generation] or 1) + (
@@ -91,12 +92,12 @@ class Evidences:
 
     @property
     def least_needed(self) -> float:
-        """The smallest of them."""
+        """The smallest threshold of the mean's hypotheses."""
         return float(self.needed(MEAN).min(initial=np.inf))
 
 
 def numbered(columns: Sequence[Column]) -> Places:
-    """Number of the effect of each column, (k,)."""
+    """Index of the effect of each column, (k,)."""
     number = {effect: at for at, effect in enumerate(dict.fromkeys(effect for effect, _ in columns))}
     return np.array([number[effect] for effect, _ in columns], dtype=np.intp)
 
@@ -107,7 +108,7 @@ def below(parts: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 
 
 def hypothesis(state: Evidences, index: int) -> tuple[str, int, str]:
-    """Effect, column and axis of a hypothesis; no axis for one of the station, and no column (-1) for an effect as a whole."""
+    """Effect, column and axis of a hypothesis; axis "" for the station, column -1 and axis "" for all columns of an effect."""
     if index >= state.sensor.size:
         effect, column = state.of_station[index - state.sensor.size]
         return effect, column, ""
@@ -136,14 +137,14 @@ def state_bytes(state: Evidences) -> bytes:
     for kind, evidence in (("sensor", state.sensor), ("station", state.station)):
         parts |= {f"{kind}/{name}": value for name, value in evidence.arrays().items()}
     buffer = io.BytesIO()
-    # names of drivers and stations are anything: they stand in a list, and the arrays have numbers
+    # names of drivers and stations may contain any character: they are stored as a list, and the arrays are numbered
     numbered = {str(number): value for number, value in enumerate(parts.values())}
     np.savez(buffer, allow_pickle=False, names=np.array(list(parts)), **numbered)
     return buffer.getvalue()
 
 
 def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mapping[str, Any]]) -> Evidences | None:
-    """The state on disk; None where it is not that of the last night, or of other hypotheses."""
+    """The stored state; None if it does not match the last night, its layout, or the present hypotheses."""
     path = folder / "state"
     if not nights or not path.is_file():
         return None

@@ -1,4 +1,4 @@
-"""Figures of a named discovery, and the discovery in sentences: its size, its levels, what carries it, what to do next."""
+"""Figures of a named discovery (size, levels, robustness, next action), and the discovery in sentences."""
 
 import math
 from typing import Any, Literal
@@ -19,18 +19,18 @@ _SHOWN_LEVELS = 40
 
 
 def plain(driver: str) -> str:
-    """A driver without the mark that it was judged inside lots."""
+    """The name of a driver without the suffix of judgement within lots."""
     return driver.removesuffix(INSIDE)
 
 
 def by_axis(name: Name) -> list[float]:
-    """Rms of the sizes of each axis over the levels, its noise taken off, g."""
+    """Rms size of each axis over the levels, g, corrected for noise."""
     weight, _, squares = _squares(name)
     return np.sqrt(np.maximum((weight * squares).sum(axis=0), 0.0)).tolist()
 
 
 def _squares(name: Name) -> tuple[Array, Array, Array]:
-    """Shares of the levels (g, 1); errors of the sizes, zero where one is not known, and their squares less noise, (g, axes)."""
+    """Weights of the levels (n, 1); standard errors (zero if unknown), g, and squares less noise, g², of the sizes (n, axes)."""
     finite = np.isfinite(name.errors)
     errors = np.where(finite, name.errors, 0.0)
     weight = name.weights / max(float(name.weights.sum()), 1e-300)
@@ -38,7 +38,7 @@ def _squares(name: Name) -> tuple[Array, Array, Array]:
 
 
 def size_of(name: Name) -> tuple[float, float, float]:
-    """Rms over levels and axes with its 95 % interval, g."""
+    """Rms size over levels and axes, and the ends of its 95 % interval, g."""
     weight, errors, squares = _squares(name)
     each = weight / 3.0
     mean = float((each * squares).sum())
@@ -47,7 +47,7 @@ def size_of(name: Name) -> tuple[float, float, float]:
 
 
 def levels_of(name: Name) -> list[DiscoveredLevel]:
-    """Levels in the order of their size, of the axis that differs most."""
+    """The levels on the axis with the largest differences, in order of size."""
     axis = int(np.argmax(by_axis(name)))
     order = np.argsort(-np.abs(name.sizes[:, axis]))[:_SHOWN_LEVELS]
     return [
@@ -63,7 +63,7 @@ def levels_of(name: Name) -> list[DiscoveredLevel]:
 
 
 def station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
-    """Size of a column at each station and its standard error at the stated noise."""
+    """Size of a column at each station, and its standard error at the stated noise, g, by station."""
     table = station.levels[STATION]
     out: dict[str, tuple[float, float]] = {}
     for label, row in table.place.items():
@@ -73,7 +73,7 @@ def station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
 
 
 def without_largest(carried: Array) -> float:
-    """Evidence of contributions without the two per cent that speak most."""
+    """Log evidence of the lots' contributions without the largest two per cent."""
     rest = np.sort(carried)[: max(1, int(0.98 * carried.size))]
     sums = Sums.of(1, two_sided=False)
     rms = float(np.sqrt(np.mean(rest**2))) or 1.0
@@ -85,7 +85,9 @@ def without_largest(carried: Array) -> float:
 def next_of(driver: str, scope: Scope) -> str:
     """The next action: a measurement, or a change of the model."""
     if scope == "sensor_or_station":
-        return "measure some of the same units on another station: what stays with the units is theirs"
+        return (
+            "measure some of the same units on another station: an effect that stays with the units is of the sensors"
+        )
     if driver == SLOT:
         return "exchange units between slots, or check the fixture at this slot"
     if driver == STATION:
@@ -124,11 +126,11 @@ def scope_text(row: DiscoveryRow) -> str:
 
 
 def unexplained_text(row: UnexplainedRow) -> str:
-    """A sentence on what differs by a driver and is no effect of the catalogue."""
+    """A sentence on a dependence on a driver that no effect of the catalogue explains."""
     what = "a function of the pose" if row["map"] else "something"
     most = f", most in {row['level']}" if row["level"] else ""
     how = "is common to all lots" if row["driver"] == MEAN else f"differs by {row['driver']}{most}"
-    text = f"{row['id']}  unexplained: {what} {how}, and no effect of the catalogue is like it"
+    text = f"{row['id']}  unexplained: {what} {how}, and no effect of the catalogue explains it"
     if row["map"]:
         size, error = np.array(row["map"])[:, 2:].T
         largest = int(np.argmax(np.abs(size)))

@@ -32,21 +32,21 @@ from pipelines.discovery.nights import held
 from pipelines.discovery.reference_rows import PROPORTIONAL, station_row, thermometer_row
 from schemas.units import MICRO
 
-LATER = 20  # lots after an alarm from which on they confirm or do not
-MOST_NAMED = 3000  # lots that the names are found with: evenly spread ones of a larger archive
-_CONFIRMED = 2.05  # standard errors beyond none (two sided 4 %), as for a fresh run
+LATER = 20  # smallest number of lots after an alarm that can confirm it
+MOST_NAMED = 3000  # largest number of lots used for naming, evenly spread over a larger archive
+_CONFIRMED = 2.05  # standard errors above zero (two-sided 4 %), as for a fresh run
 _SOME = 50
 _BY_DRIVER: dict[str, tuple[Scope, str]] = {
-    STATION: ("station", "it differs from station to station for units of the same kind, for good or by slow wander"),
+    STATION: ("station", "it differs between stations for units of the same kind, permanently or by slow wander"),
     SLOT: ("station", "it stays with the slot of the fixture while the units change"),
-    UNIT: ("sensor", "the same unit shows it again, beside other units of its lot"),
+    UNIT: ("sensor", "the same unit shows it again in later lots, compared with the other units of each lot"),
 }
 """Scope of a discovery that follows from its driver alone, and the reason."""
 
 
 @dataclass(frozen=True)
 class Discovery:
-    """A name with what is said of it."""
+    """A named effect with its first alarm, its drivers, contributions (n,) of the lots, and confirmation (factor, error)."""
 
     name: Name
     since: Alarm
@@ -59,7 +59,7 @@ class Findings(Alarms):
     """The findings of the evidence of one kind of device."""
 
     def _spread(self, most: int) -> NDArray[np.intp]:
-        """Places of lots that are evenly spread over the order of arrival, at most so many."""
+        """Indices of at most ``most`` lots, evenly spread over the order of arrival."""
         count = len(self.state.order)
         return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.intp))
 
@@ -68,23 +68,23 @@ class Findings(Alarms):
 
     @cached_property
     def some(self) -> list[ScoredLot]:
-        """Some dozen lots, evenly spread: what all have in common is seen in them."""
+        """Fifty lots at most, evenly spread, for quantities that are similar in all lots."""
         return self._lots(_SOME)
 
     @cached_property
     def lots(self) -> list[ScoredLot]:
-        """The lots that names are found with."""
+        """The lots used for naming."""
         return self._lots(MOST_NAMED)
 
     @cached_property
     def _of_sensor(self) -> list[Alarm]:
-        """Open alarms of the devices' effects and of functions of the pose; those of the thermometer stand apart."""
+        """Open alarms of effects of the devices and of functions of pose, without those of the thermometer."""
         of_devices = (alarm for alarm in self.open_alarms if alarm.index < self.state.sensor.size)
         return [alarm for alarm in of_devices if plain(alarm.driver) != OWN_TEMPCO]
 
     @cached_property
     def _named(self) -> tuple[list[Name], list[Unnamed]]:
-        """Names of what the lots hold, and functions of the pose that no effect is."""
+        """Named effects, and dependences on pose that no effect explains."""
         if not self._of_sensor:
             return [], []
         alarms = [(alarm.driver, self.effect_of(alarm)) for alarm in self._of_sensor]
@@ -93,10 +93,10 @@ class Findings(Alarms):
 
     @cached_property
     def discoveries(self) -> list[Discovery]:
-        """Names of what is beyond the threshold, in the order of their first night."""
+        """Named effects with an alarm, in the order of their first alarm."""
         out: list[Discovery] = []
         for name in self._named[0]:
-            # what is seen as a function of the pose first is named with the effect that it turns out to be
+            # an effect may first raise an alarm as a function of pose
             known = {*name.effects, SHAPE}
             alarms = [a for a in self._of_sensor if plain(a.driver) in name.drivers and self.effect_of(a) in known]
             if not alarms:
@@ -113,6 +113,7 @@ class Findings(Alarms):
         return np.concatenate([axis * k + self.pool.places(effect) for axis in range(AXES)])
 
     def _carried(self, name: Name, since: Alarm) -> tuple[Array, tuple[float, float] | None]:
+        """Contributions (n,) of the lots to a name, and its confirmation by lots after the alarm: factor, standard error."""
         driver, effect = name.drivers[0], name.effects[0]
         carried = self.pool.carried(self.lots, driver, effect)
         first = int(np.searchsorted(self._spread(MOST_NAMED), since.lots))
@@ -131,7 +132,7 @@ class Findings(Alarms):
 
         Parameters
         ----------
-        before : discoveries and what is unexplained of an earlier night with the same alarms; they are not found again
+        before : discoveries and unexplained dependences of an earlier night with the same alarms, to be reused
         """
         state, source = self.state, self.source
         heads = [source.store.head(run) for run in state.order]
@@ -224,36 +225,36 @@ class Findings(Alarms):
         if driver in _BY_DRIVER:
             return _BY_DRIVER[driver]
         if any(a.driver.endswith(INSIDE) for a in self.open_alarms if plain(a.driver) == driver):
-            return "sensor", "units of one lot differ by it; whatever the station does to a lot cancels"
+            return "sensor", "units of one lot differ by it; errors of the station are common to a lot and cancel"
         if stations < 2:
             return (
                 "sensor_or_station",
-                "one station: permanent errors of its references look the same, or its own wander",
+                "with one station, permanent errors or wander of its references cannot be excluded",
             )
         if driver not in {MEAN, DATE, SEASON}:
-            return "sensor", "lots of other stations predict it; a station's own wander is no news there"
+            return "sensor", "lots of other stations predict it, which excludes wander of a single station"
         if self.state.sensor.shared_by_stations()[self._indices(found.name.effects[0])].any():
             return "sensor", f"all {stations} stations show it, and they differ by less than it"
         return "sensor_or_station", f"{stations} stations are too few to exclude permanent errors of their references"
 
     @cached_property
     def _of_station(self) -> list[Alarm]:
-        """Alarms of the station's own columns, the strongest of each effect and driver."""
+        """Alarms of the station's columns, the strongest of each driver."""
         best: dict[tuple[str, str], Alarm] = {}
         for alarm in self.open_alarms:
             if alarm.index >= self.state.sensor.size:
                 key = self.effect_of(alarm), alarm.driver
                 best[key] = max(best.get(key, alarm), alarm, key=lambda alarm: alarm.log_e)
         strongest: dict[str, Alarm] = {}
-        # columns of one table are nearly the same: the strongest stands for its driver
+        # columns of one table are nearly collinear: the strongest represents its driver
         for alarm in sorted(best.values(), key=lambda alarm: -self.log_e(alarm)):
             strongest.setdefault(alarm.driver, alarm)
         return sorted(strongest.values(), key=lambda alarm: alarm.lots)
 
     def _held(self) -> list[HeldAlarm]:
-        reason = "the stations differ or wander in this effect by themselves, and it is the same for a whole lot"
+        reason = "it is constant within each lot, and stations differ or wander in this effect"
         if len(self.state.sensor.wander.stations) < 2:
-            reason = "one station: its references may be it"
+            reason = "with one station it may be an error of the station's references"
         rows: list[HeldAlarm] = []
         for alarm in self.state.alarms:
             if held(self.state, alarm):
@@ -263,7 +264,7 @@ class Findings(Alarms):
         return sorted(rows, key=lambda row: -row["log_e"])
 
     def _unexplained(self, *, named: bool) -> list[UnexplainedRow]:
-        """Functions of the pose that no effect is; and, where nothing is named, every driver with an alarm."""
+        """Dependences on pose that no effect explains; and, where nothing is named, every driver with an alarm."""
         rows = {unnamed.driver: self._map_row(unnamed) for unnamed in self._named[1]}
         for alarm in [] if named else sorted(self._of_sensor, key=self.log_e, reverse=True):
             effect, _, axis = hypothesis(self.state, alarm.index)
@@ -287,7 +288,7 @@ class Findings(Alarms):
         }
 
     def _map_row(self, unnamed: Unnamed) -> UnexplainedRow:
-        """That row with a map over the poses of the newest lot, on the axis where the difference is clearest."""
+        """The row of an unexplained dependence with a map over the poses of the newest lot, on the most significant axis."""
         force = self.source.poses(self.state.order[-1])
         maps = [map_of(force, *fit) for fit in zip(unnamed.size, unnamed.covariance, strict=True)]
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
@@ -330,7 +331,7 @@ class Findings(Alarms):
         inside = sum((lot.own.sum(axis=0) for lot in self.some), np.zeros(self.state.sensor.count)).reshape(AXES, -1)
         if len(self.state.order) < FIRST:
             return []
-        alone, nowhere = "the errors of the station have the same columns", "no lot excites it"
+        alone, nowhere = "errors of the station have the same columns", "no lot excites it"
         places = {effect: self.pool.places(effect) for effect in self.pool.effects}
         return [
             {"effect": effect, "reason": alone if inside[:, at].any() else nowhere}
@@ -368,6 +369,6 @@ class Findings(Alarms):
             out.append(f"{len(self.state.taken_out)} runs were taken out because a calibration of them was revoked")
         if len(self.state.sensor.wander.stations) == 1 and lots:
             out.append(
-                "one station: what is the same for whole lots may be its own wander; units measured on two stations would tell"
+                "one station: effects that are constant within a lot may be its wander; measure units on two stations"
             )
         return out

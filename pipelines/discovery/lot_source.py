@@ -1,4 +1,4 @@
-"""The lots of an archive as the evidence takes them: scores of runs with what is known of units and runs."""
+"""The lots of an archive for the evidence: scores of runs with the attributes of units and runs."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ Column = tuple[str, int]
 
 SEASON, OPERATOR = "season", "operator"
 OWN_TEMPCO = "own temperature coefficient"
-"""A driver: what a unit's thermometer has wrong, its output has wrong by this."""
-_DECIMALS = 3  # of a force in g, to which poses are the same
+"""A driver: an error of a unit's temperature reading changes its corrected output in proportion to this."""
+_DECIMALS = 3  # decimals of a force in g, to which poses are equal
 
 
 class DiscoveryArchive:
-    """The lots of an archive as the discovery takes them.
+    """The lots of an archive, for the discovery of hidden effects.
 
     Parameters
     ----------
     device : kind of device; that of most runs if empty
-    change : what is done to every lot before it is judged
+    change : function that is applied to every lot before it is judged
     """
 
     def __init__(
@@ -50,14 +50,14 @@ class DiscoveryArchive:
         self._device = device
 
     def with_change(self, change: Callable[[ScoredLot], ScoredLot]) -> DiscoveryArchive:
-        """The same archive with other lots."""
+        """The same archive with another change of its lots."""
         other = DiscoveryArchive(self.archive, self.device, change)
         other.store = self.store
         return other
 
     @cached_property
     def infos(self) -> list[Any]:
-        """Finished runs with dwells that are no re-run, in the order of their start; one that goes on is not judged yet."""
+        """Finished runs with dwells, without re-runs, in the order of their start."""
         return [
             info
             for info in self.archive.runs()
@@ -66,7 +66,7 @@ class DiscoveryArchive:
 
     @cached_property
     def device(self) -> str:
-        """The kind of device that is judged: the one asked for, else that of most runs."""
+        """The kind of device that is judged: the given one, else that of most runs."""
         counts = Counter(info.device for info in self.infos)
         if self._device:
             wanted = next((count for count in counts if count.lower() == self._device.lower()), None)
@@ -89,7 +89,7 @@ class DiscoveryArchive:
         return {device: count for device, count in counts.items() if device != self.device}
 
     def score(self, workers: int, distribute: Distributor | None = None) -> int:
-        """Score what is new; the number of runs."""
+        """Score the runs without scores; returns their number."""
         with alone(self.archive.root / FOLDER, wait=True):
             return self.store.add([info.id for info in self.infos], workers, distribute)
 
@@ -100,7 +100,7 @@ class DiscoveryArchive:
 
     @cached_property
     def revoked(self) -> set[str]:
-        """Runs of which a calibration was revoked."""
+        """Runs with a revoked calibration."""
         return {calibration.run for calibration in Ledger(self.archive).all() if calibration.state == "revoked"}
 
     def pooled(self) -> list[str]:
@@ -112,19 +112,19 @@ class DiscoveryArchive:
         return [(run, reason) for run, reason in self._reasons() if reason]
 
     def _reasons(self) -> Iterator[tuple[str, str]]:
-        """Runs of the device with scores, in the order of arrival, with the reason for one that is left out."""
+        """Runs of the device with scores, in the order of arrival, with the reason if left out, else empty."""
         heads = ((run, self.store.head(run)) for run in self.store.rows)
         return ((run, str(head["left_out"] or "")) for run, head in heads if head["device"] == self.device)
 
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
-        """Columns of the sensor and of the station that any run of the archive has."""
+        """All columns of the sensor and all of the station that occur in any run of the archive."""
         sensor = dict.fromkeys(column for products in self.store.products for column in products.columns)
         station = dict.fromkeys(column for products in self.store.products for column in products.of_station)
         return tuple(sensor), tuple(station)
 
     def lots(self, runs: Iterable[str]) -> Iterable[tuple[ScoredLot, ScoredLot]]:
-        """Each run as a lot of its sensors, and of its station."""
+        """For each run the lot of its sensors, and that of its station."""
         for run in runs:
             scored = self.store.run(run)
             yield self.lot_of(scored), self._of_station(scored)
@@ -197,7 +197,7 @@ class DiscoveryArchive:
         return out
 
     def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:
-        """A function that gives score and information of earlier measurements of a unit, inside their lots.
+        """A function of unit and n: score and information (h,) of the unit within the first n lots; None if unmeasured.
 
         Parameters
         ----------
@@ -227,7 +227,7 @@ class DiscoveryArchive:
         return of
 
     def poses(self, run: str) -> Array:
-        """Forces (n, 3), g, of the poses of a run, each once."""
+        """Forces (n, 3), g, of the distinct poses of a run."""
         force = measured(Run(self.archive, run).table("dwells")).state.force.reshape(-1, 3)
         return np.unique(np.round(force, _DECIMALS), axis=0)
 

@@ -1,7 +1,7 @@
-"""The evidence of an archive, night by night: which lots came in, what is beyond chance since then, kept in a ledger.
+"""The evidence of an archive, updated night by night: a ledger of the new lots and the new alarms of each night.
 
-``discovery/<device>/nights/<number>.json`` is never rewritten: a run whose calibration is revoked later is taken out from that
-night on, and the entry says so. ``discovery/<device>/state`` is a derived cache of the sums; without it they are made again from
+``discovery/<device>/nights/<number>.json`` is never rewritten: a run whose calibration is revoked later is removed from that
+night on, which the entry records. ``discovery/<device>/state`` is a derived cache of the sums, which can be computed again from
 the scores.
 """
 
@@ -44,7 +44,7 @@ def fresh(source: DiscoveryArchive) -> Evidences:
 
 
 def grown_by_days(source: DiscoveryArchive, state: Evidences, runs: Sequence[str]) -> Evidences:
-    """Evidence with further lots, a night for each day on which they were measured: years are caught up in one go."""
+    """Evidence with further lots, one night for each day of measurement, so that a backlog of years is processed at once."""
     for _, of_day in groupby(runs, key=lambda run: str(source.store.head(run)["when"])[:10]):
         state.night += 1
         for sensor, station in source.lots(of_day):
@@ -73,10 +73,10 @@ def _raised(state: Evidences) -> list[Alarm]:
 
 
 def held(state: Evidences, alarm: Alarm) -> bool:
-    """Whether the station may cause an alarm: the driver is common to a lot, the effect wanders or differs between stations."""
+    """Whether a station may cause an alarm: its driver is constant within a lot, and the effect wanders or differs by station."""
     sensor, wander = state.sensor, state.sensor.wander
     if alarm.index >= sensor.size or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT, STATION}:
-        return False  # of a station, for good or by wander: stations differ
+        return False  # judged within lots, or explicitly attributed to the station
     if alarm.driver == MEAN:
         of_station = ~sensor.shared_by_stations() | sensor.guarded
     else:
@@ -84,14 +84,14 @@ def held(state: Evidences, alarm: Alarm) -> bool:
         of_station = walk > WALK_FROM
     if alarm.index < sensor.count or sensor.effects is None:
         return bool(of_station[alarm.index])
-    # of an effect as a whole: where columns and axes that would be held back carry more than a fifth
+    # an effect judged by all its columns is held if columns and axes that would be held contribute more than a fifth
     of_effect, sums = sensor.effects == alarm.index - sensor.count, sensor.drivers[alarm.driver]
     carried = of_effect * over(sums.s[: sensor.count] ** 2, sums.v[: sensor.count])
     return float(carried[of_station].sum()) > _MOST_HELD * float(carried.sum())
 
 
 def brought_up(source: DiscoveryArchive) -> Evidences:
-    """The evidence of the archive with everything that came in since the last night."""
+    """The evidence of the archive, updated with runs scored and revoked since the last night."""
     folder = source.folder()
     with alone(folder, wait=True):
         nights = _nights(folder)
@@ -122,14 +122,14 @@ def _nights(folder: Place) -> list[dict[str, Any]]:
 
 
 def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> Evidences:
-    """The evidence as the ledger says that it grew; lots whose scores are gone are not in it any more."""
+    """The evidence, computed again in the order of the ledger; lots without scores or removed later are left out."""
     state = fresh(source)
     out = {run for night in nights for run in night["taken_out"]}
     for night in nights:
         runs = [run for run in night["runs"] if run in source.store.rows and run not in out]
         state = grown_by_days(source, state, runs)
     state.taken_out = [run for night in nights for run in night["taken_out"]]
-    # an alarm that was raised stays, also where a run that carried it was taken out since
+    # an alarm that was raised remains, even if a run that contributed to it was removed since
     index = {_text_of(state, at): at for at in range(state.sensor.size + state.station.count)}
     state.alarms += state.unknown(
         Alarm(alarm["driver"], index[alarm["column"]], night["night"], alarm["lots"], alarm["log_e"])
@@ -148,7 +148,7 @@ def _write(
     gone: Sequence[str],
     nights: Sequence[Mapping[str, Any]],
 ) -> None:
-    """The entry of a night, which is never written again, and the state as a cache."""
+    """Write the entry of a night, which is never rewritten, and the state as a cache."""
     data = state_bytes(state)
     entry = {
         "night": state.night,
@@ -175,20 +175,17 @@ def _text_of(state: Evidences, index: int) -> str:
     return f"{effect}.{column}" + (f".{axis}" if axis else "") if column >= 0 else effect
 
 
-_VERSION = 2  # of what is kept of a look: of an earlier one the discoveries alone are read, and all is found again
-_GROWN = 1.05  # more lots than this factor: the names are found again
+_VERSION = 2  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
+_GROWN = 1.05  # growth of the number of lots from which on the naming is repeated
 
 
 def alarm_key(state: Evidences) -> list[str]:
-    """The alarms of a state as text: while they are the same, so are the names."""
+    """The open alarms of a state as text: while they do not change, the names do not either."""
     return sorted(f"{alarm.driver} {alarm.index}" for alarm in state.alarms if not held(state, alarm))
 
 
 def found_before(source: DiscoveryArchive, state: Evidences) -> tuple[list[DiscoveryRow], list[UnexplainedRow]] | None:
-    """Discoveries and what is unexplained as of the last night; None where they are to be found again.
-
-    They stay where no alarm is new and few lots came in since.
-    """
+    """Discoveries and unexplained dependences of the last night; None if alarms or the number of lots changed too much."""
     before = _found(source.folder())
     if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
         return None
@@ -196,7 +193,7 @@ def found_before(source: DiscoveryArchive, state: Evidences) -> tuple[list[Disco
 
 
 def discovered_before(archive: Archive) -> list[tuple[str, int]]:
-    """Kinds of devices with discoveries of an earlier look, named or not, and their number; nothing is judged."""
+    """Kinds of devices with stored discoveries, named or not, and their number; nothing is evaluated."""
     top = archive.root / FOLDER
     folders = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
     found = {folder.name: _found(folder) for folder in folders if folder.name not in {"scores", "lock"}}
@@ -222,9 +219,9 @@ def _found(folder: Place) -> dict[str, Any] | None:
 def remembered(
     source: DiscoveryArchive, state: Evidences, document: DiscoverDocument, *, keep: bool
 ) -> DiscoverDocument:
-    """The document with the ids that discoveries had before, and with those that are new.
+    """The document with discoveries identified by their earlier ids, and the list of new ones.
 
-    keep : beside the evidence, so that what is new is known the next time; a look at a part leaves it for the night to tell
+    keep : store the findings, so that they are not new the next time; not for an evaluation of a part of the archive
     """
     stored = _found(source.folder()) or {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0}
     known: list[dict[str, Any]] = [*stored["discoveries"], *stored["unexplained"]]
@@ -233,7 +230,7 @@ def remembered(
     document["new"] = []
     for row in rows:
         row["id"] = ""
-    # the same effects first; then what was unexplained and has a name now, or the other way round
+    # match equal effects first; then discoveries that were unexplained before and have a name now, or vice versa
     for matches in (_effects_in_common, lambda old, new: not _effects(old) or not _effects(new)):
         for row in (row for row in rows if not row["id"]):
             earlier = next((old for old in left if old["driver"] == row["driver"] and matches(old, row)), None)
@@ -260,7 +257,7 @@ def remembered(
 
 
 def _effects(row: Mapping[str, Any]) -> set[str]:
-    """The class of effects of a discovery; none of what is unexplained."""
+    """The class of effects of a discovery; empty for an unexplained dependence."""
     return set(row.get("effects", ()))
 
 

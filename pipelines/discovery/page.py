@@ -1,4 +1,4 @@
-"""Discoveries as one page that needs no network: levels with intervals, evidence over the lots, what could have been seen."""
+"""Discoveries as one self-contained page: levels with intervals, evidence over the lots, smallest detectable sizes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from pipelines.drawing.mollweide import project, sphere
 from pipelines.report.templates import template
 
 MOST_LEVELS = 30
-FAINT = 0.5  # powers of ten of evidence that are not drawn
+FAINT = 0.5  # evidence, in powers of ten, up to which nothing is drawn
 
 
 def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
@@ -103,7 +103,7 @@ def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, C
 
 
 def strongest_chart(findings: Findings) -> Chart | None:
-    """The largest evidence of each effect by each driver, as powers of ten; None where there is none to be drawn."""
+    """The largest evidence of each effect by each driver, in powers of ten; None if there is none to draw."""
     state, effects = findings.state, findings.pool.effects
     if not state.order:
         return None
@@ -112,7 +112,7 @@ def strongest_chart(findings: Findings) -> Chart | None:
     grid = np.zeros((len(effects), len(drivers)))
     for name, sums in state.sensor.drivers.items():
         column = drivers.index(name.removesuffix(INSIDE))
-        # what counts from more evidence on is drawn by as much less
+        # evidence with a higher threshold is reduced by the difference of the thresholds
         for index, log_e in enumerate(sums.log_e - state.needed(name) + state.least_needed):
             row = effects.index(hypothesis(state, index)[0])
             grid[row, column] = max(grid[row, column], log_e / np.log(10.0))
@@ -134,7 +134,7 @@ def strongest_chart(findings: Findings) -> Chart | None:
 
 
 def reach_chart(document: DiscoverDocument, lots: int) -> Chart:
-    """Smallest size against lots: what this archive has, how it falls, and the discoveries as points."""
+    """Smallest detectable size against the number of lots, with the discoveries as points."""
     grid = np.geomspace(30.0, max(4.0 * lots, 120.0), 40)
     best: dict[str, list[float]] = {}
     for row in document["reach"]:

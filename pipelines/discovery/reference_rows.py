@@ -1,4 +1,4 @@
-"""Discoveries that are of the references and not of the devices: the station's own columns, and its thermometer."""
+"""Discoveries of errors of the references, not of the devices: columns of the station, and its thermometer."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from pipelines.discovery.lot_source import AXES, OWN_TEMPCO
 from schemas.units import MICRO
 
 PROPORTIONAL = (
-    "it is proportional to each unit's own temperature coefficient: the temperature that is read is off in some soaks"
+    "it is proportional to each unit's own temperature coefficient: the temperature readings are wrong in some soaks"
 )
 
 
 def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
-    """The row of an error of the station, which changes the force itself for all units of a lot."""
+    """The row of an error of the station, which changes the force for all units of a lot."""
     effect, column, _ = hypothesis(known.state, alarm.index)
     at = alarm.index - known.state.sensor.size
     station = known.state.station
@@ -42,7 +42,7 @@ def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
         "size_floors": known.floors(size),
         "log_e": round(known.log_e(alarm), 2),
         "scope": "station",
-        "because": f"the force itself is changed, for all units of a lot alike (column {column + 1} of {effect})",
+        "because": f"the force is changed equally for all units of a lot (column {column + 1} of {effect})",
         "levels": [
             {"level": label, "size_ug": MICRO * value, "u_ug": MICRO * error * scale, "units": 0}
             for label, (value, error) in sizes.items()
@@ -60,7 +60,7 @@ def thermometer_row(known: Alarms) -> DiscoveryRow:
     sums = known.state.sensor.levels[OWN_TEMPCO + INSIDE]
     slope, total = (sums.place[label] for label in (SLOPE, ALL))
     information = sums.information[slope]
-    # rms over the units: of the coefficient, of its error by the scatter inside lots
+    # rms over the units, of the coefficient and of its error by the scatter within lots
     spread = np.sqrt(over(information, sums.information[total])) * known.pool.size
     size = over(sums.score[slope], information) * spread
     error = np.where(information > 0.0, known.state.sensor.noise[1], 0.0) * over(spread, np.sqrt(information))

@@ -1,8 +1,8 @@
-"""Scores of an archive's runs on disk, a file for each time that new runs were scored.
+"""Scores of an archive's runs on disk, one file for each batch of newly scored runs.
 
-A derived cache with a seal: where it was edited, or has another layout, it is made again from the runs.
-``discovery/scores/<number>.scores`` has a row for each run; columns of one plan are nearly the same for all its runs, so that the
-products of the columns are kept once a file, as means.
+They are a sealed, derived cache: a file that was edited or has another layout is computed again from the runs.
+``discovery/scores/<number>.scores`` has a row for each run; the columns of one plan are nearly equal for all its runs, so that
+the products of the columns are stored once per file, as means.
 """
 
 from __future__ import annotations
@@ -32,14 +32,16 @@ from schemas.units import MICRO
 FOLDER = "discovery"
 VERSION = 4
 TEXTS = ("run", "when", "station", "device", "model", "who", "left_out")
-_STEPS = 63.0  # of information shares, an octave
-_SHARE_STEPS = 58.0  # of what the station leaves of the information, an octave: down to one part in twenty
-_MEAN_STEPS = 256.0  # of information, an octave
-_FINE, _LINEAR = 16.0, 64.0  # steps of a score a standard deviation, up to so many of them; relative ones beyond
+_STEPS = 63.0  # steps per octave of a unit's share of the information
+_SHARE_STEPS = (
+    58.0  # steps per octave of the share left after elimination of the station's errors, down to one twentieth
+)
+_MEAN_STEPS = 256.0  # steps per octave of the mean information
+_FINE, _LINEAR = 16.0, 64.0  # steps of a score per standard deviation, up to 64 of them; logarithmic beyond
 _NOTHING = -(2**15)
 AXES = 3
-_WITHIN, _ACROSS = 2048.0, 256.0  # steps of a correlation of columns of one axis, and of two
-MOST_OPEN = 32  # files whose rows are kept in memory: units that come again were often measured together
+_WITHIN, _ACROSS = 2048.0, 256.0  # steps per unit correlation of columns on one axis, and on two axes
+MOST_OPEN = 32  # files whose rows are kept in memory: units measured repeatedly were often measured together
 BATCH = 8  # runs that one process scores at a time
 
 
@@ -67,7 +69,7 @@ class Products:
 class ScoreFile(NamedTuple):
     """One file of scores, of which the packed rows stay on disk.
 
-    heads : texts, units and noise of each run · names : columns of the sensor and of the station by their mark
+    heads : texts, units and noise of each run · names : columns of the sensor and of the station, and number of runs, by hash
     """
 
     path: Place
@@ -85,7 +87,7 @@ class ScoreStore:
 
     @cached_property
     def _all(self) -> tuple[list[ScoreFile], list[Products]]:
-        """Every file that is sound, in the order of their making, and the products of all of them."""
+        """Every intact file, in order of creation, and the products of all of them."""
         out, products = list[ScoreFile](), dict[Any, Products]()
         for path in sorted(self._paths(), key=lambda item: item.name):
             data, state = derived.unframed(path)
@@ -95,7 +97,7 @@ class ScoreStore:
                 continue
             names = _names(read.about)
             heads = read.table.select([*TEXTS, "units", "floor"]).to_pylist()
-            for head in heads:  # of a hundred thousand runs, many have the same
+            for head in heads:  # interned, because many of a hundred thousand runs have equal texts
                 head.update({name: sys.intern(head[name]) for name in TEXTS if name not in {"run", "when"}})
             out.append(ScoreFile(path, heads, names))
             with np.load(io.BytesIO(read.products), allow_pickle=False) as arrays:
@@ -108,7 +110,7 @@ class ScoreStore:
 
     @property
     def files(self) -> list[ScoreFile]:
-        """Every file that is sound, in the order of their making."""
+        """Every intact file, in order of creation."""
         return self._all[0]
 
     @property
@@ -144,7 +146,7 @@ class ScoreStore:
         return _run_of(self._opened[number].slice(row, 1).to_pylist()[0], file.names)
 
     def add(self, ids: Sequence[str], workers: int, distribute: Distributor | None = None) -> int:
-        """Score runs that are not scored yet, in processes; the number of new ones."""
+        """Score runs without scores, in parallel processes; returns the number of newly scored runs."""
         new = [run_id for run_id in ids if run_id not in self.rows]
         if not new:
             return 0
@@ -192,7 +194,7 @@ def _group(run: ScoredRun) -> str:
 
 
 def _packed(name: str, run: ScoredRun) -> bytes:
-    """Arrays in few bytes: scores in sixteenths of their standard deviation, information to three digits."""
+    """An array of a run in few bytes: scores in sixteenths of their standard deviation, information to three digits."""
     if run.left_out or run.score is None or run.own is None or run.information is None or run.station_scores is None:
         return b""
     if name == "tempco":
@@ -203,10 +205,10 @@ def _packed(name: str, run: ScoredRun) -> bytes:
         return _planes(steps)
     mean = run.own.mean(axis=0)
     if name == "own":
-        # ratios between a quarter and four in steps of one per cent; zero is zero
+        # ratios between a quarter and four in steps of one per cent; zero is exact
         ratio = run.own / np.where(mean > 0.0, mean, 1.0)
         code = _logarithms(ratio, _STEPS, 128)
-        # a unit's ratios are much the same in all columns: their differences are small
+        # a unit's ratios are similar in all columns: their differences are small and compress well
         return np.diff(code, axis=1, prepend=np.uint8(0)).tobytes()
     if name == "information":
         share = run.information / np.where(mean > 0.0, len(run.own) * mean, 1.0)
@@ -216,7 +218,7 @@ def _packed(name: str, run: ScoredRun) -> bytes:
 
 
 def _planes(values: NDArray[np.int16]) -> bytes:
-    """Numbers of two bytes, all high ones first: they are nearly the same, and are compressed away."""
+    """Two-byte integers with all high bytes first: these are nearly equal and compress well."""
     return np.ascontiguousarray(values).view(np.uint8).reshape(-1, 2).T[::-1].tobytes()
 
 
@@ -226,7 +228,7 @@ def _of_planes(data: bytes) -> Array:
 
 
 def _logarithms(ratio: Array, steps: float, unity: int) -> NDArray[np.uint8]:
-    """Ratios as logarithms in one byte, ``unity`` is the code of a ratio of one; zero is zero."""
+    """Ratios as logarithms in one byte; ``unity`` is the code of a ratio of one, zero that of zero."""
     code = np.round(steps * np.log2(np.clip(ratio, 1e-30, None))) + unity
     return np.where(ratio > 0.0, np.clip(code, 1, 255), 0).astype(np.uint8)
 
@@ -265,7 +267,7 @@ class _Content(NamedTuple):
 
 
 def _content(data: bytes) -> _Content | None:
-    """The rows of a file, what is said of its columns, and its products; None where another version wrote it."""
+    """The rows, the metadata and the products of a file; None for another version of the layout."""
     length = int.from_bytes(data[:8], "big")
     table = pq.read_table(pa.BufferReader(data[8 : 8 + length]))
     about = json.loads((table.schema.metadata or {}).get(b"about", b"{}"))

@@ -1,4 +1,4 @@
-"""The scores of one run of an archive, as they are kept: a few bytes a unit, so that no dwell is read again."""
+"""The scores of one run of an archive, in the form in which they are stored, so that no dwell is read again."""
 
 import logging
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ LOGGER = logging.getLogger("tumbleline.discovery")
 
 @dataclass(frozen=True)
 class ScoredRun:
-    """The scores of a run, as they are stored.
+    """The scores of a run, with the quantities of :class:`inertial.discovery.scores.LotScores`.
 
-    left_out : why it is not pooled; empty where it is · columns : of the sensor, then of the station
-    score, own : (units, m·k); information : (m·k,) · station : (2, q), scores and information
-    lot : (m·k, m·k), inside : (m, k, k), products of the columns · size : (m·k,) · floor : g
-    tempco : (units, m), g/K, of the biases; nan without one
+    left_out : reason why it is not pooled, else empty · columns, of_station : columns of the sensor and of the station
+    score, own : (units, m·k); information : (m·k,) · station_scores : (2, q), scores and information
+    lot : (m·k, m·k), inside : (m, k, k), products of the columns · size : (m·k,), g · floor : g
+    tempco : (units, m), g/K, temperature coefficients of the biases; nan without one
     """
 
     run: str
@@ -53,7 +53,7 @@ class ScoredRun:
 
 
 def scored_runs(part: tuple[str, Sequence[str]]) -> list[ScoredRun]:
-    """The scores of some runs of an archive, with the reason for what is not pooled; a damaged run has none, and is tried again.
+    """The scores of runs of an archive, or the reason why a run is not pooled; a damaged run is omitted, and tried again later.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _scored(run: Run) -> ScoredRun:
 
 
 def _reason(run: Run, effects: Sequence[str], verdict: pd.DataFrame | None) -> str:
-    """Why a run is not scored; empty where it is."""
+    """The reason why a run is not scored, else empty."""
     if not effects:
         return "it has no model"
     if not (run.path / "dwells.parquet").is_file():

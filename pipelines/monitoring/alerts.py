@@ -124,7 +124,7 @@ def _of_discoveries(folder: Path, now: datetime) -> Iterator[Alert]:
         effects, drivers = (" | ".join(map(str, row.get(key, ()))) for key in ("effects", "drivers"))
         what = f"{effects} by {drivers}, rms {float(row.get('size_ug') or 0.0):.2g} µg; {row.get('because')}"
         if not effects:
-            what = f"unexplained by {row.get('driver')}, no effect of the catalogue is like it"
+            what = f"unexplained by {row.get('driver')}, no effect of the catalogue explains it"
         text = f"discovery {row.get('id')}: {what}"
         yield _alert("discovery", f"{row.get('id')} {row.get('since')}", str(row.get("driver", "")), text, now)
 

@@ -1,7 +1,7 @@
-"""Other statistics of an Allan record: modified, Hadamard, total and time deviation, TIE and MTIE.
+"""Further statistics of a static record: modified Allan, Hadamard, total and time deviation, TIE and MTIE.
 
-Values and degrees of freedom are those of allantools, except of MTIE. The overlapping Allan deviation is not among them: see
-docs/decisions/statistics-of-records.md.
+Values and degrees of freedom are computed by allantools, except MTIE. The overlapping Allan deviation is in
+:mod:`inertial.noise.allan`; see docs/decisions/statistics-of-records.md.
 """
 
 from collections.abc import Callable
@@ -21,18 +21,18 @@ from inertial.noise.terms import NoiseTerms
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
 
 POWER = {"Q": 2, "N": 0, "B": -1, "K": -2}
-"""Exponent α of the frequency in the density of each noise term, as the degrees of freedom need it; a ramp is no noise."""
+"""Exponent α of the power spectral density fᵅ of each noise term, which the degrees of freedom depend on; a ramp has none."""
 
 TOTAL_BIAS = {0: 0.0, -1: 1.0 / (3.0 * np.log(2.0)), -2: 0.75}
-"""a of the total variance by α: its expectation is smaller than the Allan variance by 1 − a·τ/T, T the length of the record
+"""Coefficient a by α: the expectation of the total variance is the Allan variance times 1 − a·τ/T, T the length of the record
 (Greenhall, Howe and Percival, IEEE Trans. UFFC 46 (1999) 1183; NIST SP 1065, 5.2.11)."""
 
 TABLED = 8
-"""Samples of an averaging time from which the table of degrees of freedom of the total variance holds: for white noise at one
-sample it gives 1.5·n, the differences have n/1.5 (coverage of the interval 0.50 instead of 0.68)."""
+"""Smallest averaging time, in samples, for the table of degrees of freedom of the total variance: for white noise at one sample
+the table gives 1.5·n, but the differences have n/1.5 (coverage of the interval 0.50 instead of 0.68)."""
 
 M_S2 = {"g": STANDARD_GRAVITY_M_S2, "mg": STANDARD_GRAVITY_M_S2 / 1e3, "µg": STANDARD_GRAVITY_M_S2 / MICRO, "m/s²": 1.0}
-"""m/s² in the units of an output whose integral is a velocity in m/s."""
+"""Factor to m/s² by unit of the output, for outputs whose integral is a velocity in m/s."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class Statistic:
 
     Parameters
     ----------
-    compute : deviations (t,) of a record (n,) at a rate (Hz) and averaging times (t,) samples; unit of the output, or of its
-        integral if ``integral``
+    compute : function of a record (n,), a rate (Hz) and averaging times (t,), samples: deviations (t,), unit of the output, or of
+        its integral if ``integral``
     parts : shortest record, in averaging times
-    freedom : degrees of freedom of the variance at α, m and n; None: the statistic has no interval
-    bias : expectation of the variance over the Allan variance that it estimates, at α and m/n
-    sees_ramp : whether a ramp of the output is part of the deviation
+    freedom : degrees of freedom of the variance for α, m and n samples; None: the statistic has no interval
+    bias : expectation of the variance over the Allan variance, for α and m/n
+    sees_ramp : whether a ramp of the output contributes to the deviation
     """
 
     name: str
@@ -70,7 +70,7 @@ class Deviations:
 
 
 def _of_allantools(name: str) -> Callable[[Array, float, Array], Array]:
-    """A deviation of allantools; the averaging times it gets are those it returns."""
+    """The ``compute`` of a deviation of allantools, which returns values at exactly the given averaging times."""
 
     def compute(record: Array, rate_hz: float, m: Array) -> Array:
         return np.asarray(getattr(allantools, name)(record, rate=rate_hz, data_type="freq", taus=m / rate_hz)[1])
@@ -79,7 +79,7 @@ def _of_allantools(name: str) -> Callable[[Array, float, Array], Array]:
 
 
 def _mtie(record: Array, rate_hz: float, m: Array) -> Array:
-    """Largest range of the integral in any window of m steps: allantools.mtie, which visits every sample of every window."""
+    """MTIE (t,): largest range of the integral in any window of m steps; equal to the much slower allantools.mtie."""
     phase = np.concatenate([[0.0], np.cumsum(record - record.mean()) / rate_hz])
     out = np.empty(m.size)
     for i, size in enumerate(int(steps) + 1 for steps in m):
@@ -93,7 +93,7 @@ def _greenhall(order: int, *, modified: bool) -> Callable[[int, int, int], float
 
 
 def _total_freedom(alpha: int, m: int, n: int) -> float:
-    """Known for α = 0, −1 and −2 only. At a few samples the total variance is the Allan variance."""
+    """Degrees of freedom of the total variance, by those of the Allan variance for few samples; NaN if α is not tabulated."""
     if alpha not in TOTAL_BIAS:
         return np.nan
     return ci.edf_greenhall(alpha, 2, m, n + 1, overlapping=True) if m < TABLED else ci.edf_totdev(n, m, alpha)
@@ -125,16 +125,16 @@ def deviations(
     *,
     explained: Flags,
 ) -> Deviations:
-    """A statistic of records, at the averaging times of their Allan curve that it allows.
+    """A statistic of records, at those averaging times of their Allan curve for which the record is long enough.
 
-    The intervals (68.27 %) have the degrees of freedom of the noise term that is largest at each averaging time. There is none
-    where a ramp is the largest, where no mixture explains the curve, and where no degrees of freedom are known.
+    The intervals (68.27 %) use the degrees of freedom of the largest noise term at each averaging time. There is no interval
+    where a ramp is largest, where no mixture of terms explains the curve, and where no degrees of freedom are known.
 
     Parameters
     ----------
-    records : (c, n), in ``unit``; the mean of each is taken out before it is integrated
-    curve, terms : of the same records
-    explained : (c,) whether the terms explain the curve
+    records : (c, n), in ``unit``; the mean is subtracted before integration
+    curve, terms : Allan curve and noise terms of the same records
+    explained : (c,), whether the terms explain the curve
     """
     m = curve.m[statistic.parts * curve.m <= curve.n]
     tau = m / curve.rate_hz
@@ -158,7 +158,7 @@ def _integrated(unit: str) -> tuple[float, str]:
 
 
 def _largest(mixture: Array, tau: Array, statistic: Statistic) -> list[int | None]:
-    """α of the term with the largest share of the Allan variance at each averaging time; None for a ramp."""
+    """Exponent α of the term with the largest share of the Allan variance at each averaging time; None for a ramp."""
     q, n, b, k, r = mixture[:, None]
     ramp = r**2 * tau**2 / 2.0 if statistic.sees_ramp else np.zeros_like(tau)
     shares = np.stack(
@@ -169,7 +169,7 @@ def _largest(mixture: Array, tau: Array, statistic: Statistic) -> list[int | Non
 
 
 def _interval(statistic: Statistic, powers: list[int | None], m: Index, n: int) -> Array:
-    """Ends (2, t) of the interval over the deviation."""
+    """Lower and upper end of the interval, (2, t), relative to the deviation; NaN without an interval."""
     rows = [
         (np.nan, 1.0) if alpha is None else (_freedom(statistic, alpha, int(k), n), statistic.bias(alpha, int(k) / n))
         for alpha, k in zip(powers, m, strict=True)
@@ -185,7 +185,7 @@ def _interval(statistic: Statistic, powers: list[int | None], m: Index, n: int) 
 
 @lru_cache(maxsize=512)
 def _freedom(statistic: Statistic, alpha: int, m: int, n: int) -> float:
-    """Degrees of freedom; NaN where the formulas have no case."""
+    """Degrees of freedom; NaN where no formula is available."""
     if statistic.freedom is None:
         return np.nan
     try:

@@ -26,38 +26,38 @@ from pipelines.tables.frames import empty_table, joined_parts, picked
 from schemas.errors import DataRejected
 from schemas.units import MICRO
 
-LONG_S = 3600.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of three at most
+LONG_S = 3600.0  # shortest record whose random walk is extrapolated to a day, by a factor of about three at most
 
 
 def fit(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], family: Family | None = None
 ) -> dict[str, pd.DataFrame]:
-    """Coefficients, covariance, residuals and noise of the recipe's effects for every unit of a lot.
+    """Tables of coefficients, covariance, residuals and noise of the recipe's effects for every unit of a lot.
 
-    The white-noise error sd/√n of a dwell is a lower bound. Wander between dwells is estimated with the coefficients
-    (method ``wander``); where there are too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: Birge
-    ratio squared). The table ``wander`` says which; ``prior`` what the family of the devices adds. Tables without rows come back
-    where no unit was accepted. Units that lack dwells which others have are fitted on theirs: with the noise of the units that
-    have the same dwells, or, where the model has values that all units share, in one fit of the lot.
+    The white-noise error sd/√n of a dwell is a lower bound. Wander between dwells is estimated together with the coefficients
+    (method ``wander``); with too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: squared Birge ratio).
+    The table ``wander`` states the method, ``prior`` the contribution of the device family. The tables have no rows if no unit
+    was accepted. Units without some dwells of the others are fitted to those they have: with the noise of units with the same
+    dwells, or, if the model has values shared by all units, in one fit of the lot.
 
     Parameters
     ----------
-    dwells : of every kind; those for verification are not fitted; they only state earlier conditions
-    history : temperatures between the dwells; None where there are none
-    family : of the devices; None for a fit without a prior
+    dwells : dwells of every kind; those for verification are not fitted, but belong to the history of the others
+    history : temperatures between the dwells; None if not recorded
+    family : family of the devices, for a prior; None for a fit without one
     """
     return fit_tables(LotTables(dwells, history), effects, family)
 
 
 def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None = None) -> dict[str, pd.DataFrame]:
-    """:func:`fit` of tables that other stages read as well."""
+    """:func:`fit` of tables that are shared with other stages."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
     return joined_parts([_tables(lot, _fitted(lot, effects, family)) for lot in _lots(tables, effects)])
 
 
 def _lots(tables: LotTables, effects: Sequence[str]) -> list[LotArrays]:
-    """The parts of a lot that are fitted together: units with the same dwells, or all where the model has shared values."""
+    """The parts of a lot that are each fitted together: units with the same dwells, or all units for a model of shared values."""
     if len(tables.parts) == 1:
         return [tables.fitted_kinds]
     sensor, station = design.split(effects)
@@ -72,10 +72,10 @@ def _tables(lot: LotArrays, fitted: NoisyFit) -> dict[str, pd.DataFrame]:
 
 
 class FittedLot(NamedTuple):
-    """A fit for stages that follow in memory.
+    """A fit for later stages in memory.
 
-    tables : those of :func:`fit`; expected : its ``predictions``, as covariances (units, 3, m, m), µg², for the m dwells for
-    verification where all units have all dwells; calibration : None where no unit was fitted
+    tables : as of :func:`fit`; calibration : the coefficients as arrays, None if no unit was fitted
+    expected : covariances (units, 3, m, m), µg², of the m verification dwells; or the table ``predictions`` if dwells are missing
     """
 
     tables: dict[str, pd.DataFrame]
@@ -84,7 +84,7 @@ class FittedLot(NamedTuple):
 
 
 def fit_in_memory(tables: LotTables, effects: Sequence[str], family: Family | None = None) -> FittedLot:
-    """:func:`fit_tables` with what the stages after it read as arrays: the same numbers."""
+    """:func:`fit_tables` with the same numbers also as arrays, which later stages read."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return FittedLot(_nothing(), np.zeros((0, 3, 0, 0)), None)
     if len(tables.parts) > 1:
@@ -117,7 +117,7 @@ def _rows(lot: LotArrays, fitted: NoisyFit) -> dict[str, pd.DataFrame]:
 
 
 def _prior_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
-    """The prior of every coefficient, and its share in the variance; without rows where there is none."""
+    """The prior of every coefficient and its share in the variance; without rows if there is no prior."""
     prior = fitted.prior
     if prior is None or fitted.of_prior is None:
         return empty_table(**_PRIOR)

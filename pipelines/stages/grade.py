@@ -1,4 +1,4 @@
-"""Decisions: every figure of every unit against its limit under the agreed rule, the grade, and the reasons."""
+"""Conformity decisions: every figure of every unit against its limit under the agreed rule, the grade, and the reasons."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -41,10 +41,10 @@ BEST_OF_NOISE = "consumer"
 class GradeEvidence:
     """The tables that a decision is based on.
 
-    uncertainties, budget_covariance : of the uncertainty budget; None, or without rows, where nothing is stated
+    uncertainties, budget_covariance : tables of the uncertainty budget; None, or without rows, if no uncertainty is stated
     full_scale : largest excursion of the output from 0 g by unit, output unit
-    calibration : coefficients with their covariance, where other stages have read them already
-    budget : the uncertainty budget in place of its two tables, where they are not made
+    calibration : coefficients with their covariance, if other stages have read them already
+    budget : the uncertainty budget instead of its two tables, if these are not made
     """
 
     verdicts: pd.DataFrame
@@ -63,7 +63,7 @@ class GradeEvidence:
 
     @property
     def basis(self) -> str:
-        """The basis of the uncertainties."""
+        """The basis of the uncertainties: the budget, or noise only."""
         if self.budget is not None:
             return BUDGET
         return NOISE_ONLY if self.uncertainties is None or self.uncertainties.empty else BUDGET
@@ -87,7 +87,7 @@ def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
 
 
 def _missing(figure: str, recipe: Recipe) -> str:
-    """What a recipe lacks to yield a figure; empty where it lacks nothing."""
+    """The part of a recipe that is missing for a figure; empty if the recipe yields the figure."""
     if figure in FIGURES:
         return FIGURES[figure].missing(recipe) if recipe.tumbles else "procedure multi_position"
     if figure in figures_of_recipe(recipe):
@@ -101,14 +101,14 @@ def grade(
 ) -> dict[str, pd.DataFrame]:
     """Tables ``figures`` (one row per unit and figure), ``grades`` (one row per unit) and ``lot_risks`` (one per limited figure).
 
-    With an uncertainty budget the grade is based on the error expected over the period of validity, if that is known; without one
-    no unit has a grade above consumer.
+    With an uncertainty budget the grade is based on the error expected over the period of validity, if known; without a budget no
+    unit gets a grade above consumer.
 
     Parameters
     ----------
-    zero_g : nominal output at 0 g, output unit.
-    tumbles : whether the recipe has the multi-position test; without it a unit has no coefficients, and is not refused for that
-    figures : whether the tables ``figures`` and ``lot_risks`` are made, which no decision reads
+    zero_g : nominal output at 0 g, output unit
+    tumbles : whether the recipe has the multi-position test; without it units have no coefficients and are not refused for that
+    figures : whether to make the tables ``figures`` and ``lot_risks``, which no decision depends on
     """
     rule = describe_rule(limits)
     guard = limits.guard_factor
@@ -191,7 +191,7 @@ def _stated(table: pd.DataFrame | None, units: int) -> Array | None:
 
 
 def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> list[Figure]:
-    """The figures of a unit that procedures have determined; of several axes, or repeated procedures, the largest."""
+    """The figures of a unit from procedures; of several axes, or of repeated procedures, the one closest to its limit."""
     figures: dict[str, Figure] = {}
     if table is None or table.empty:
         return []
@@ -200,7 +200,7 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
         why = "" if row["identified"] else f"axis {row['axis']}: {row['note']}"
         value = float(row["value"]) if row["identified"] else np.inf
         name = str(row["figure"])
-        # runs of earlier versions have none
+        # runs of earlier versions lack these columns
         dof, removed = float(row.get("dof", np.nan)), float(row.get("removed", 0.0))
         error = float(row["uncertainty"]) if not why else 0.0
         figure = Figure(name, str(row["unit_text"]), Value(value, error, why, dof=dof, removed=removed))
@@ -212,7 +212,7 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
 
 
 def _badness(figure: Value, guard: float, *, least: bool) -> float:
-    """How far a figure lies towards its limit, with its guard band; infinite where it is not determined, or no number."""
+    """Figure plus guard band in the direction of its limit, for comparison; infinite if not determined or not a number."""
     if figure.why_not:
         return float("inf")
     badness = (-figure.value if least else abs(figure.value)) + guard * figure.uncertainty
@@ -237,6 +237,7 @@ def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
 def _decided(
     verdict: dict, figures: list[Figure], decisions: list[Decision], limits: Limits, basis: str
 ) -> dict[str, object]:
+    """The row of the table ``grades`` of a unit: outcome, grade, its risk, and the reasons of a failure."""
     best, risk = NO_GRADE, float("nan")
     reasons = [decision.sentence for decision in decisions if not decision.passed]
     reasons += [
@@ -259,7 +260,7 @@ def _decided(
 
 
 def _why(figure: Figure, best: str, basis: str) -> str:
-    """The reason that limits a grade, in brackets."""
+    """The reason why a grade is not higher, in brackets; empty if there is none."""
     if figure.name == PERIOD_FIGURE:
         return f" (95 % bound of the largest error over the period of validity {float(f'{figure.of.value:.3g}'):g} µg)"
     if best != BEST_OF_NOISE:
@@ -305,5 +306,5 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
 
 
 def has_least(limits: Limits) -> bool:
-    """Whether a limit is a least value: such figures have a separate column, since ``limit`` is of a magnitude."""
+    """Whether any limit is a lower limit: such figures have the column ``least``, because ``limit`` is an upper limit."""
     return any(figure.min is not None for figure in limits.figures.values())

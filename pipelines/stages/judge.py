@@ -1,4 +1,4 @@
-"""The verdict on the model of a run: whether it is adequate, with residual, noise and probability; one row of the archive."""
+"""The verdict on the model of a run: whether it is adequate, with residual, noise and probability; a table with one row."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
@@ -36,7 +36,7 @@ class AdequacyDocument(TypedDict):
 
 
 def judge(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
-    """The table ``verdict`` of a run; without rows where it has no model, as without a multi-position test."""
+    """The table ``verdict`` of a run; without rows if the run has no model, as without a multi-position test."""
     if not effects:
         return {"verdict": verdict_table(None, effects)}
     verdict, shares = _judged(dwells, history, effects)
@@ -45,7 +45,7 @@ def judge(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[
 
 
 def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> AdequacyDocument:
-    """The verdict of a diagnosis on a model, without classes and proposals; the reason where data or an effect are not usable."""
+    """The verdict of a diagnosis on a model, without classes and proposals; or the reason why it cannot be judged."""
     return _judged(dwells, history, effects)[0]
 
 
@@ -84,7 +84,7 @@ def _judged(
 
 
 def told_by(diagnosis: Mapping[str, Any], units: int) -> AdequacyDocument:
-    """The verdict that a diagnosis of the same dwells of some units, and of the same model, has told."""
+    """The verdict from the document of a diagnosis of the same dwells and model; ``units``: number of units diagnosed."""
     faulty = sorted({unit for fault in diagnosis["blocked_by"] for unit in fault["units"]})
     adequate, error = diagnosis["adequate"], diagnosis["error"]
     named = bool(diagnosis["classes"] or diagnosis["unexplained"])

@@ -23,14 +23,13 @@ HOUR_S = 3600.0
 MEAN_S = 100.0
 _TAIL, ONE_SIDED = 0.025, 0.05
 PARTS = 100
-"""Of a mean, by whose differences its white noise is known."""
+"""Number of parts of each mean, whose differences give its white noise."""
 
 
 def bias_stability(record: Array, rate_hz: float) -> tuple[float, float, float] | None:
-    """Standard deviation of the 36 means, and the ends of its 95 % interval by χ²; None for a record of less than an hour.
+    """Standard deviation of 36 means of 100 s, and the ends of its 95 % interval by χ²; None for less than an hour of record.
 
-    Means of wander are not independent: the degrees of freedom are those of the noise in the record. A drift is part of the
-    value.
+    Under wander the means are not independent: the degrees of freedom are those of the noise in the record. Drift is included.
 
     Parameters
     ----------
@@ -52,10 +51,12 @@ def bias_stability(record: Array, rate_hz: float) -> tuple[float, float, float] 
 
 MOST_SAMPLES = (
     2**18
-)  # of a channel that lie in memory: 24 h at 100 Hz are means of 33 samples, and tau begins at 0.33 s
-UNEXPLAINED_P = 1e-6  # the covariance of the curve is itself estimated, so only a clear misfit counts
-FEWEST = 192  # samples of a channel: six averaging times, as many as five terms need
-MOVED_K = 0.01  # change of the temperature of a record from which it is stated
+)  # samples of a channel held in memory: 24 h at 100 Hz are averaged over 33 samples, so that tau begins at 0.33 s
+UNEXPLAINED_P = (
+    1e-6  # p-value of a misfit: only a clear one counts, because the covariance of the curve is estimated, too
+)
+FEWEST = 192  # samples of a channel: they give six averaging times, the fewest for five terms
+MOVED_K = 0.01  # change of temperature during a record above which it is stated
 N_ONE_SIDED = "n_d"
 B_BOUND = "B_bound"
 UNITS = {"Q": "µg·s", "N": "µg/√Hz", N_ONE_SIDED: "µg/√Hz", "B": "µg", "K": "µg/√s", "R": "µg/s", B_BOUND: "µg"}
@@ -64,7 +65,7 @@ TERM_COLUMNS = ["unit", "axis", "term", "value", "low", "high", "identified", "u
 
 @dataclass(frozen=True)
 class StaticChannel:
-    """One axis of one unit: its record (n,) in µg without the response to its temperature, or the reason why there is none."""
+    """The record (n,), µg, of one axis of one unit without its temperature response; ``silent``: why it has no noise figures."""
 
     unit: str
     axis: str
@@ -76,7 +77,7 @@ class StaticChannel:
 
 @dataclass(frozen=True)
 class StaticRecord:
-    """The static record of a run; ``size`` : samples, at ``rate_hz``, of which each value of the channels is the mean."""
+    """The static record of a run; each value of the channels is the mean of ``size`` samples at ``rate_hz``."""
 
     channels: list[StaticChannel]
     rate_hz: float
@@ -225,7 +226,7 @@ def _sorted(curves: pd.DataFrame, order: dict[tuple[str, str], int]) -> pd.DataF
 
 
 def without_disturbed(terms: NoiseTerms, disturbed: Sequence[Sequence[Disturbance]]) -> NoiseTerms:
-    """The terms of channels of which some hold what no noise explains: no mixture of terms describes these."""
+    """The terms with χ² set to infinity for channels with material disturbances, which no mixture of terms describes."""
     return replace(
         terms,
         chi2=np.where([any(disturbance.material for disturbance in found) for found in disturbed], np.inf, terms.chi2),
@@ -233,10 +234,10 @@ def without_disturbed(terms: NoiseTerms, disturbed: Sequence[Sequence[Disturbanc
 
 
 def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms:
-    """The terms, with mere upper limits for channels whose curve no mixture of the five terms explains.
+    """The terms, with upper limits only for channels whose curve no mixture of the five terms explains.
 
-    Each term alone can be no larger than the whole curve anywhere: N ≤ min σ·√τ, B ≤ min σ/0.664, K ≤ min σ·√(3/τ), … The least
-    of many uncertain limits is too low: each is that of 95 % over the number of averaging times (Bonferroni).
+    No single term can exceed the curve at any averaging time: N ≤ min σ·√τ, B ≤ min σ/0.664, K ≤ min σ·√(3/τ), … Because the
+    minimum of many uncertain limits is too low, each limit has 5 % divided by the number of averaging times (Bonferroni).
     """
     tau = curve.tau
     tail = 1.0 - ONE_SIDED / tau.size

@@ -1,4 +1,4 @@
-"""The fit of a lot, and the noise of its dwells by the residuals."""
+"""The fit of a lot, with the noise of its dwells estimated from the residuals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from pipelines.tables.dwells import LotArrays
 from schemas.errors import DataRejected
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which the kind of its noise cannot be estimated
+FEWEST_TO_SPARE = 4  # degrees of freedom of the lot below which wander cannot be separated from white noise
 _PER_G = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
 """Output per g by the name of the output's unit, for models without a scale."""
 _TURNED_G = 0.1  # difference of force between dwells from which on they have more than one orientation
@@ -30,16 +30,16 @@ PLAIN = ("bias", "scale", "misalignment")
 
 @dataclass(frozen=True)
 class NoisyFit:
-    """A fit, and the noise by its residuals; arrays in the output's unit.
+    """A fit, and the noise estimated from its residuals; arrays in the output's unit.
 
-    noise, expected : (units, n, 3), standard deviations of one dwell's noise, and of its residual
-    predicted : (units, 3, m, m), covariance of the residuals of the m dwells for verification
-    flicker, walk, white : (units, 3), standard deviations; walk at the end of the record; walk_shown : whether the walk is
-    distinguished from flicker
-    lack_of_fit : (units, 3), variance of the residuals over that of the noise, 1 where it is no larger
+    noise, expected : (units, n, 3), standard deviations of the noise, and of the residual, of each dwell
+    predicted : (units, 3, m, m), covariance of the residuals of the m verification dwells
+    white, flicker, walk : (units, 3), standard deviations; walk at the end of the record
+    walk_shown : whether the random walk is distinguished from 1/f noise
+    lack_of_fit : (units, 3), variance of the residuals over that of the noise, at least 1
     per_g : (units, 3), output per g
-    gain : (units, 3, p, n), derivative of the coefficients by every output of the n fitted dwells; known : factor of their errors
-    prior : of the lot; of_prior : (units, 3, p), its share in the variance of every coefficient; None without a prior
+    gain : (units, 3, p, n), derivative of the coefficients by the outputs of the n fitted dwells; known : factor on their errors
+    prior : prior of the lot; of_prior : (units, 3, p), its share in the variance of every coefficient; None without a prior
     """
 
     method: Literal["wander", "birge"]
@@ -61,15 +61,15 @@ class NoisyFit:
 
 
 def fitted_with_noise(lot: LotArrays, effects: Sequence[str], family: Family | None = None) -> NoisyFit:
-    """The fit of a lot: with the wander between its dwells, or by the Birge ratio where too few dwells show its kind.
+    """The fit of a lot with wander between its dwells, or by the Birge ratio where too few dwells allow to estimate wander.
 
-    family : of the lot's devices, whose coefficients are a prior of these
+    family : family of the lot's devices, whose coefficients are the prior
     """
     used = lot.of_kind("dwell")
     there = used if lot.missing is None else used & ~lot.missing
     error = np.where(there[..., None], lot.standard_error, np.inf)
     if lot.missing is not None:
-        # what has no weight may be any number, but a near number costs no digits
+        # outputs of missing dwells have no weight; values close to the model avoid loss of digits
         _refuse_short(lot, effects, there)
         near = fit_lot(effects, lot.state, lot.output, error)
         lot = replace(lot, output=np.where(lot.missing[..., None], lot.output - near.residuals, lot.output))
@@ -100,12 +100,12 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str], family: Family | N
 
 
 def _refuse_short(lot: LotArrays, effects: Sequence[str], there: Flags) -> None:
-    """Refuse a unit with fewer dwells than coefficients on an axis, by its name.
+    """Refuse a lot that has a unit with fewer dwells than coefficients on an axis.
 
     Raises
     ------
     DataRejected
-        There is such a unit.
+        Names the unit.
     """
     sensor, _ = design.split(effects)
     values = design.starting_values(sensor, lot.state)
@@ -119,7 +119,7 @@ def _refuse_short(lot: LotArrays, effects: Sequence[str], there: Flags) -> None:
 
 
 class _Belief:
-    """The prior of a lot, judged when its own estimates are known."""
+    """The prior of a lot, tested against the lot's own estimates when these are known."""
 
     def __init__(self, family: Family, effects: Sequence[str], units: Sequence[str]) -> None:
         self.family, self.effects, self.units = family, effects, units
@@ -131,7 +131,7 @@ class _Belief:
 
 
 def _felt(lot: LotArrays, used: Flags) -> Array:
-    """Force along the sensors' own axes at every dwell, (units, n, 3), g; misalignment from the dwells of the fit alone."""
+    """Force along the sensors' input axes at every dwell, (units, n, 3), g; misalignment from the fitted dwells only."""
     force, fitted = lot.state.force, lot.state.force[:, used]
     theta = None if lot.state.theta is None else np.broadcast_to(lot.state.theta, lot.output.shape[:2])[:, used]
     turn = pseudo_inverses(fitted) @ felt_force(fitted, lot.output[:, used], theta, lot.state.axes)
@@ -159,7 +159,7 @@ def _by_wander(lot: LotArrays, fitted: WanderFit, used: Flags) -> NoisyFit:
 
 
 def _by_birge(lot: LotArrays, plain: LotFit, used: Flags, believed: _Belief | None) -> NoisyFit:
-    """The plain fit with its covariance scaled, by Student's factor too; all its noise is taken to be white."""
+    """The plain fit with its covariance scaled by χ²/ν and Student's factor; all noise is assumed white."""
     stretch = np.maximum(1.0, plain.chi2 / np.maximum(plain.dof, 1))  # χ²/ν, never below one
     noise = lot.standard_error * np.sqrt(stretch)[:, None, :]
     columns = design.local_columns(design.split(plain.effects)[0], lot.state, plain.nonlinear)
@@ -194,7 +194,7 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: Flags, believed: _Belief | No
 
 
 def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
-    """Output per g of every unit and axis, (units, 3): the scale of the model, or what the output's unit says where it has none.
+    """Output per g of every unit and axis, (units, 3): the scale of the model, else that of the output's unit.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def profiled(lot: LotArrays, effects: Sequence[str], used: Flags) -> dict[str, d
 
 
 def _in_g(lot: LotArrays, used: Flags) -> Lot:
-    """The lot in g, over the nominal scale of each unit and axis; dwells that are not fitted count as missing."""
+    """The lot in g, outputs divided by the fitted scale of each unit and axis; dwells that are not fitted count as missing."""
     plain = fit_lot(PLAIN, lot.state, lot.output, np.where(used[..., None], lot.standard_error, np.inf))
     scale = np.abs(plain.scale())
     scale = np.where(scale > 0.0, scale, 1.0)

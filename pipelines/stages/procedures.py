@@ -25,12 +25,12 @@ def procedures(
     covariance: pd.DataFrame,
     noise: pd.DataFrame | None = None,
 ) -> dict[str, pd.DataFrame]:
-    """Tables ``procedure_points``, ``procedure_figures`` and ``procedure_findings``; without rows where the recipe has no list.
+    """Tables ``procedure_points``, ``procedure_figures`` and ``procedure_findings``; without rows for a recipe without a list.
 
     Parameters
     ----------
-    samples : gives the samples of some records, by their numbers
-    noise : terms of the static record of the run
+    samples : function from record numbers to the samples of these records
+    noise : noise terms of the static record of the run
     """
     if not recipe.procedures:
         return procedure_tables([])
@@ -41,7 +41,7 @@ def procedures(
     for number, part in enumerate(parts_of(recipe)):
         procedure = PROCEDURES[part.kind]
         if not isinstance(procedure, Evaluated):
-            continue  # its records are those of the stages reduce, fit, verify and noise
+            continue  # the stages reduce, fit, verify and noise evaluate its records
         numbered = [
             (record, step) for record, (of, step) in enumerate(steps) if of == number and step.kind == "procedure"
         ]
@@ -58,7 +58,7 @@ def procedures(
 def _analysed(
     procedure: Evaluated, part: Part, records: Iterable[ProcedureRecord], device: Device, units: list[str]
 ) -> tuple[pd.DataFrame, Outcome]:
-    """Points, figures and findings; a unit for which a declared figure is missing gets it as not determined, with the reason.
+    """Points, figures and findings; a declared figure that is missing for a unit is "not determined", with the reason.
 
     Parameters
     ----------

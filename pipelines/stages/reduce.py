@@ -20,7 +20,7 @@ KEPT = (
     "out_unit",
 )
 WHERE_THERE = (BY_ATTRIBUTE["power_off"].column,)
-"""Of runs that switch their devices off and on."""
+"""Columns only of runs that switch their devices off and on."""
 
 
 class FollowedSupply(NamedTuple):
@@ -30,7 +30,7 @@ class FollowedSupply(NamedTuple):
     share: float
 
     def ratio(self, supply: Array) -> Array:
-        """Output over that at the nominal supply, of measured supplies in V."""
+        """Output at measured supplies, V, over that at the nominal supply."""
         return 1.0 + self.share * (supply / self.nominal_V - 1.0)
 
 
@@ -45,11 +45,11 @@ def reduce(
 
     Parameters
     ----------
-    summaries : of the samples, :func:`pipelines.tables.summaries.summarised`
-    readings : of the whole run; the reference force comes from the encoder readings.
-    verdicts : of the validate stage.
-    local_gravity_m_s2 : at the station; the force is stated in standard g.
-    follows : how the outputs follow the measured supply; they are referred to the nominal one then
+    summaries : summaries of the samples, :func:`pipelines.tables.summaries.summarised`
+    readings : readings of the complete run; the reference force comes from the encoder readings
+    verdicts : verdicts of the validate stage
+    local_gravity_m_s2 : gravity at the station; the force is stated in standard g
+    follows : how the outputs follow the supply; if given, they are corrected to the nominal supply
     """
     accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
     means = summaries.loc[
@@ -70,9 +70,9 @@ def reduce(
 
 
 def at_nominal_supply(dwells: pd.DataFrame, follows: FollowedSupply) -> pd.DataFrame:
-    """The dwells with the outputs that the devices had at their nominal supply, by the supply measured in each dwell.
+    """The dwells with outputs corrected to the nominal supply, by the supply measured in each dwell.
 
-    The whole output follows, the level at 0 g included: 1 ppm of supply moves the bias of 1.5 V at 0.3 V/g by 5 µg.
+    The complete output follows the supply, including the level at 0 g: 1 ppm of supply moves a level of 1.5 V at 0.3 V/g by 5 µg.
     """
     column = BY_ATTRIBUTE["supply"].column
     supply = dwells[column].to_numpy(dtype=float)

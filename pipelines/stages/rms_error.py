@@ -15,9 +15,9 @@ _WEIGHTS = _RAW / np.sqrt(2.0 * np.pi)
 
 
 def rms_columns(errors: Array, covariance: Array, letters: Sequence[str] = AXES) -> dict[str, Array]:
-    """Columns of a verification that are the same for all dwells of a unit, (...,) each, by their names.
+    """Columns of a verification that are equal for all dwells of a unit, (...,) each, by name.
 
-    Uncertainty of the RMS of each axis, RMS of a correct model, and degrees of freedom of its square.
+    For each axis: uncertainty of the RMS, RMS expected of a correct model, and degrees of freedom of its square.
 
     Parameters
     ----------
@@ -34,14 +34,14 @@ def rms_columns(errors: Array, covariance: Array, letters: Sequence[str] = AXES)
 
 
 def rms_uncertainty(error: Array, covariance: Array) -> Array:
-    """Standard uncertainty of the RMS r = √(eᵀe/m) of errors e = μ + noise of the covariance Σ.
+    """Standard uncertainty of the RMS r = √(eᵀe/m) of errors e = μ + noise with covariance Σ.
 
-    For normal noise E(eᵀe) = μᵀμ + tr Σ and Var(eᵀe) = 4·μᵀΣμ + 2·tr Σ². μ is not known: it is taken for the share of e by which
-    eᵀe is more than noise makes, tr Σ and one standard deviation √(2·tr Σ²); taken for more, the uncertainty of errors that are
-    noise alone comes out a fifth too large in the mean. eᵀe is then nearly c + g·χ² of ν degrees of freedom with the same first
-    three cumulants (Pearson; J. P. Imhof, Biometrika 48 (1961) 419), and so the standard deviation of its root is known. Wander
-    over a run makes m dwells worth one or two: linearisation of the root states up to 1.66 times the standard deviation there,
-    and rms/√(2m), which holds for white errors, far too little.
+    For normal noise E(eᵀe) = μᵀμ + tr Σ and Var(eᵀe) = 4·μᵀΣμ + 2·tr Σ². The unknown μ is taken as the share of e by which eᵀe
+    exceeds the noise plus one standard deviation, tr Σ + √(2·tr Σ²); with a larger share the uncertainty of errors that are noise
+    alone would be a fifth too large on average. eᵀe is approximated by c + g·χ² of ν degrees of freedom with the same first three
+    cumulants (Pearson; J. P. Imhof, Biometrika 48 (1961) 419), which gives the standard deviation of its root. Under wander m
+    dwells count as one or two: there linearisation of the root gives up to 1.66 times the standard deviation, and the formula for
+    white errors, rms/√(2m), far too small a value.
 
     Parameters
     ----------
@@ -65,10 +65,10 @@ def rms_uncertainty(error: Array, covariance: Array) -> Array:
 
 
 def _spread_of_root(second: Array, third: Array) -> Array:
-    """Standard deviation of the root of a positive sum of squares of mean 1 with these second and third cumulants.
+    """Standard deviation of the root of a positive sum of squares of mean 1 with given second and third cumulants.
 
-    Of χ²/ν it is 0.603 for one degree of freedom, and 1/√(2ν) for many. χ² is the cube of a normal value (Wilson and Hilferty,
-    Proc. Nat. Acad. Sci. 17 (1931) 684).
+    For χ²/ν it is 0.603 with one degree of freedom, and 1/√(2ν) with many. χ² is approximated by the cube of a normal variable
+    (Wilson and Hilferty, Proc. Nat. Acad. Sci. 17 (1931) 684).
     """
     dof = np.clip(8.0 * second**3 / np.maximum(third**2, _TINY), 0.5, 1e8)
     width = np.sqrt(0.5 * second / dof)

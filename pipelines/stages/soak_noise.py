@@ -24,9 +24,9 @@ from schemas.units import MICRO
 
 GROWS, FALLS, DIFFERS, SAME, NOT_TOLD, NOT_JUDGED = ("grows", "falls", "differs", "steady", "not told", "not judged")
 FALSE_RATE = 0.01
-"""Probability that any axis of a run without a change is named by its own ratio: each has its part (Bonferroni)."""
+"""Probability that any axis of a run with constant noise is reported by its own ratio; divided over the axes (Bonferroni)."""
 STEADY = 0.2
-"""Departure of the ratio of the ends from one, beyond which its interval may not reach where noise is called steady."""
+"""Limit of the deviation of the ratio hot/cold from 1 that its interval must not exceed for noise to be called steady."""
 UNIT = "µg/√Hz"
 
 
@@ -34,7 +34,7 @@ UNIT = "µg/√Hz"
 class _Soak:
     """Sums over the records of equal length of one unit in one soak.
 
-    total : (axes, t), of Allan variances, output unit squared · step : (axes,), finest step between digits, 0 for fine ones
+    total : (axes, t), output unit squared, sum of Allan variances · step : (axes,), output unit, finest digit, 0 if not coarse
     """
 
     m: Index
@@ -52,12 +52,12 @@ def soak_noise(
     coefficients: pd.DataFrame,
     covariance: pd.DataFrame,
 ) -> dict[str, pd.DataFrame]:
-    """White noise N of every soak (table ``soak_noise``) and what it does over temperature (table ``noise_temperature``).
+    """White noise N of every soak (table ``soak_noise``) and its change over temperature (table ``noise_temperature``).
 
-    N is that of IEEE Std 952 in µg/√Hz, two-sided, with a 95 % interval: the term of the noise stage, of the mean of the Allan
-    variances of all dwells of the soak. ``curve`` is the fitted density, ``curve_u`` its standard uncertainty. p is the F test by
-    which the judge tells louder soaks, over the axes of all units; each axis is judged by its own ratio too. No rows where the
-    soaks are not apart in temperature.
+    N is that of IEEE Std 952 in µg/√Hz, two-sided, with a 95 % interval: the term of the noise stage, of the mean Allan variance
+    of all dwells of the soak. ``curve`` is the fitted density, ``curve_u`` its standard uncertainty. ``p_value`` is that of the F
+    test for soaks of different noise in a diagnosis, over the axes of all units; each axis is also judged by its own ratio. There
+    are no rows if the soaks do not differ in temperature.
     """
     if coefficients.empty:
         return _nothing()
@@ -79,7 +79,7 @@ def soak_noise(
 def _soaks(
     samples: Iterable[pd.DataFrame], readings: pd.DataFrame, calibration: Calibration
 ) -> dict[tuple[str, int], _Soak]:
-    """The sums of every unit and soak; a soak whose temperature moved is left out, and records of another length."""
+    """The sums of every unit and soak, without soaks of changing temperature and records of another length."""
     static = readings[~readings["kind"].isin([STATIC, PROCEDURE]) & (readings["status"] == "ok")]
     found = {(int(r["record"]), str(r["unit"])): r for r in rows_of(static)}
     lengths = static["n"].mode()
@@ -117,7 +117,7 @@ def _soak_rows(unit: str, soak: int, sums: _Soak, calibration: Calibration) -> l
     if not alive.size:
         return []
     curve = curve_of(mean[alive], sums.m, sums.n, sums.rate_hz, sums.records)
-    # the Allan variance of neighbours is the variance of a sample by their differences
+    # the Allan variance at one sample is the sample variance from differences of neighbours
     digits = [Coarse(float(sums.step[a] / scale[a]), float(mean[a, 0]), np.inf) for a in alive.tolist()]
     terms = without_digits(limits_where_unexplained(curve, fit_terms(curve, only="N")), digits, sums.rate_hz)
     return [
@@ -142,7 +142,7 @@ def _white(terms: NoiseTerms, channel: int) -> dict[str, Any]:
 
 
 def _difference(table: pd.DataFrame) -> float:
-    """Probability of the differences between soaks over the axes of all units; nan for fewer than two axes in all soaks."""
+    """p-value of the differences between soaks over the axes of all units; nan for fewer than two axes with all soaks."""
     sizes = table.pivot_table(index=["unit", "axis"], columns="soak", values="value").dropna()
     if len(sizes) < 2 or sizes.shape[1] < 2:
         return float("nan")
@@ -150,7 +150,7 @@ def _difference(table: pd.DataFrame) -> float:
 
 
 def _change(table: pd.DataFrame, rows: pd.DataFrame, p: float, axes: int) -> dict[str, Any] | None:
-    """The change of one axis over temperature; its curve is written into the rows of the table."""
+    """The row of an axis in ``noise_temperature``, None if undetermined; its fitted curve is written into ``table``."""
     known = rows[rows["identified"]]
     temperature, value = (known[name].to_numpy(dtype=float) for name in ("temperature_C", "value"))
     u = (known["high"] - known["low"]).to_numpy(dtype=float) / (2.0 * NORMAL_95)
@@ -182,9 +182,9 @@ def verdict(ratio: float, half: float, p: float, axes: int) -> str:
     ----------
     ratio, half : N of the hottest soak over that of the coldest, and its 95 % half width
     p : probability of equal soaks over the axes of the lot; nan if there is none
-    axes : judged together, of all units
+    axes : number of axes of all units that are judged together
     """
-    # in the logarithm, in which the curve is fitted
+    # tested in the logarithm, in which the curve is fitted
     own_p = 2.0 * float(normal_tail(abs(np.log(ratio)) * NORMAL_95 * ratio / half))
     if own_p < FALSE_RATE / axes or p < LOUDER_BELOW:
         return GROWS if ratio - half > 1.0 else FALLS if ratio + half < 1.0 else DIFFERS

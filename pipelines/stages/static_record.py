@@ -1,4 +1,4 @@
-"""The static record of a lot, collected table by table: samples, coarse digits with their noise, known share of temperature."""
+"""The static record of a lot, collected table by table: samples, resolution of the digits, known temperature response."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -18,15 +18,15 @@ from pipelines.tables.calibration import Calibration
 from schemas.units import AXES
 
 COUNTED = 1000
-"""Different values of a channel that are counted: an output with more values has no coarse digits."""
+"""Largest number of distinct values of a channel that are counted: an output with more values has no coarse digits."""
 SMOOTHED_S = 120.0
-"""Time over which the thermometer's readings are averaged: so that its own noise does not enter the output through the tempco."""
+"""Averaging time of the temperature readings, so that the noise of the thermometer does not enter the corrected output."""
 FEWEST_READINGS = 5
 
 
 @dataclass
 class Digits:
-    """The number of occurrences of each value of a channel, and the variance of its samples by the differences of neighbours."""
+    """Counts of the distinct values of a channel, and its sample variance from differences of neighbours."""
 
     counts: dict[float, int] = field(default_factory=dict)
     many: bool = False
@@ -54,7 +54,7 @@ class Digits:
 
     @property
     def variance(self) -> float:
-        """Variance of a sample by the differences of neighbours, unit of the output squared."""
+        """Variance of a sample from differences of neighbours, unit of the output squared."""
         return 0.5 * self.squares / max(self.n - 1, 1)
 
     @property
@@ -64,9 +64,9 @@ class Digits:
 
 
 class StaticSeries:
-    """Outputs of the static record, collected table by table; of a long record the means of ``size`` samples each.
+    """Outputs of the static record, collected table by table as means of ``size`` samples.
 
-    The Allan deviation of means is that of the samples themselves, from an averaging time of ``size`` samples on.
+    From an averaging time of ``size`` samples on, the Allan deviation of the means equals that of the samples.
     """
 
     def __init__(self, units: Sequence[str], size: int, letters: Sequence[str] = AXES) -> None:
@@ -96,9 +96,9 @@ class StaticSeries:
 class Warmed:
     """The response of an output to the temperature of the static record, by the tempco of the model.
 
-    change : (n, m), of the output, its mean taken out; zero if unknown
-    span_K : by which the smoothed temperature moved, NaN where it was not read often enough
-    known : whether the model has a tempco
+    change : (n, m), output unit, change of the output about its mean; zero if unknown
+    span_K : range of the smoothed temperature, NaN if it was not read often enough
+    known : whether the model has a temperature coefficient
     """
 
     change: Array
@@ -111,13 +111,13 @@ def warmed(
 ) -> Warmed:
     """The known response of a record to its temperature.
 
-    The thermometer's readings between the dwells (table ``history``) are averaged over two minutes, put through the model's
-    temperature effects in the pose of the record, and interpolated.
+    The temperature readings of the table ``history`` are averaged over two minutes; the model's temperature effects are evaluated
+    at these in the pose of the record, and interpolated.
 
     Parameters
     ----------
     time : (n,), s, of the values
-    reading : row of the static record: angles of the table
+    reading : row of the static record in the table of readings, with the table angles
     """
     still = np.zeros((time.size, len(calibration.axes)))
     smoothed = None if history is None or not time.size else _smoothed(history, unit, float(time[0]), float(time[-1]))
@@ -162,10 +162,10 @@ SHOWN = 0.02
 
 @dataclass(frozen=True)
 class Coarse:
-    """Digits of one channel, in µg.
+    """Resolution of one channel.
 
-    step : between two digits, zero if none is detected; variance : of a sample, as it came out, by the differences of neighbours
-    most : largest standard deviation of a sample before rounding that such digits allow, 95 %
+    step : µg, between two digits, zero if none is detected; variance : µg², of rounded samples, from differences of neighbours
+    most : µg, upper limit (95 %) of the standard deviation of a sample before rounding
     """
 
     step: float
@@ -186,7 +186,7 @@ class Coarse:
 
     @property
     def spread(self) -> float:
-        """Standard deviation of a sample before rounding by Sheppard's correction."""
+        """Standard deviation, µg, of a sample before rounding, by Sheppard's correction."""
         return float(np.sqrt(without_rounding(np.asarray(self.variance), np.asarray(self.step))))
 
     @property
@@ -208,11 +208,11 @@ def remark(digits: Coarse, unit: str = "µg") -> str:
 
 
 def without_digits(terms: NoiseTerms, digits: Sequence[Coarse], rate_hz: float) -> NoiseTerms:
-    """The terms (channels, 5) without the part of N that coarse digits make.
+    """The terms (channels, 5) without the contribution of coarse digits to N.
 
-    Rounding adds q²/12 of white variance to a sample of noise above half a digit; its intervals are widened for the unknown place
-    of the mean between two digits. Below that the output only shows how often the noise crossed to the next digit: N then has an
-    upper limit.
+    With noise above half a digit, rounding adds a white variance of q²/12 per sample; the intervals are widened for the unknown
+    position of the mean between two digits. With less noise the output only shows how often the noise reaches the next digit: N
+    then has an upper limit only.
 
     Parameters
     ----------
@@ -235,5 +235,5 @@ def without_digits(terms: NoiseTerms, digits: Sequence[Coarse], rate_hz: float) 
 
 
 def _less(coefficient: float, variance: float, rate_hz: float) -> float:
-    """N without some white variance of a sample."""
+    """N after subtraction of a white variance per sample."""
     return float(np.sqrt(max(coefficient**2 - variance / rate_hz, 0.0)))

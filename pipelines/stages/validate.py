@@ -19,8 +19,8 @@ from schemas.units import AXES
 FEWEST_TO_JUDGE = 10  # samples: fewer equal values in a row happen by chance where the step is coarse
 CHAMBER_MOVED_K = 5.0
 FOLLOWED_SHARE = 0.2  # a sensor that follows less than a fifth of the chamber's change does not measure its temperature
-FORCE_EXPLAINS = 0.5  # of an axis' variance over the poses; a live channel has more than 0.99
-TURNED_G = 0.5  # a follow-up may stay in a few poses: an axis that they hardly turn shows no response
+FORCE_EXPLAINS = 0.5  # smallest share of an axis' variance over the poses; a working channel has more than 0.99
+TURNED_G = 0.5  # smallest range of the force along an axis that is tested: follow-up measurements may have few poses
 SAMPLES_KEPT = 0.99
 
 
@@ -37,9 +37,9 @@ def validate(summaries: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Un
 
     Parameters
     ----------
-    summaries : of the samples, :func:`pipelines.tables.summaries.summarised`
-    readings : of the whole run.
-    units : the lot, so that a unit which never answered has a verdict too.
+    summaries : summaries of the samples, :func:`pipelines.tables.summaries.summarised`
+    readings : readings of the complete run
+    units : units of the lot, so that a unit without any reading has a verdict, too
     """
     faults = [*_silent(readings, units), *_reading_faults(readings)]
     readings = readings[readings["kind"] != PROCEDURE]
@@ -146,7 +146,7 @@ def _fault_of(summary: Mapping[Any, Any] | None, unit: str, n: int, full: float)
 def _stale_temperatures(readings: pd.DataFrame) -> list[DataFault]:
     soaks = readings.groupby(["unit", "soak"])[["chamber_C", "unit_C"]].mean().groupby("unit")
     spans = soaks.max() - soaks.min()
-    # with records on a ramp the means of soaks are not conclusive: a device that lags the chamber has similar means
+    # for records on a ramp the means of soaks are not conclusive, because a device that lags the chamber has similar means
     records = readings.groupby("unit")[["chamber_C", "unit_C"]]
     crossed = records.quantile(0.95) - records.quantile(0.05)
     stale = spans[
@@ -186,13 +186,13 @@ def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[DataFaul
 
 
 def _turned(rows: pd.DataFrame) -> Flags:
-    """Axes that the poses turn far enough to expect a response, (3,)."""
+    """Whether the range of the force along each axis is large enough to expect a response, (3,)."""
     force = force_from_angles(*np.radians(rows[["outer_deg", "inner_deg"]].to_numpy()).T)
     return np.asarray(np.ptp(force, axis=0) >= TURNED_G)
 
 
 def _explained_by_force(rows: pd.DataFrame) -> Array:
-    """Share of each output's variance inside the soaks that a linear function of the force explains, (m,)."""
+    """Share of each output's variance within the soaks that a linear function of the force explains, (m,)."""
     force = force_from_angles(*np.radians(rows[["outer_deg", "inner_deg"]].to_numpy()).T)
     soaks = (rows["soak"].to_numpy()[:, None] == np.unique(rows["soak"].to_numpy())).astype(float)
     output = np.nan_to_num(rows[there(rows, AXES)].to_numpy(dtype=float), posinf=0.0, neginf=0.0)
@@ -208,11 +208,11 @@ def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:
 
     Parameters
     ----------
-    means : unit, record and the mean outputs x, y, z; a unit with a gap in a soak does not count there
+    means : unit, record and the mean outputs x, y, z; a unit with a missing record in a soak is not used there
 
     Returns
     -------
-    0 for devices with fewer than three axes: the error is seen by the angles between their outputs.
+    The error as of :func:`inertial.pointing.pointing_error`; 0 for devices with fewer than three axes.
     """
     if len(there(means, AXES)) < len(AXES):
         return 0.0
@@ -221,6 +221,7 @@ def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:
 
 
 def _of_soak(means: pd.DataFrame, static: pd.DataFrame) -> float:
+    """The pointing error of one soak; 0 if no unit has all its records."""
     outputs = [
         rows.set_index("record")[list(AXES)].reindex(static.index).to_numpy(dtype=float)
         for _, rows in means.groupby("unit")
@@ -236,15 +237,15 @@ BY_CHANCE = 1e-6  # probability that a sound thermometer is refused
 
 
 def frozen(readings: pd.DataFrame) -> Iterator[tuple[str, int, float]]:
-    """Units whose thermometer froze before the end, with the number of equal records and the temperature, °C.
+    """Units whose temperature reading is frozen at the end, with the number of equal records and the temperature, °C.
 
-    Readings stay equal to the last digit although they should change: while the chamber holds one temperature this is the only
-    sign. How often the mean of a sound thermometer changes from one record to the next is known from its own earlier records and
-    from the other units at the same time; the smaller share is used.
+    At constant chamber temperature the only sign is that the readings stay equal to the last digit. How often the mean of a
+    working thermometer changes from one record to the next is estimated from its earlier records and from the other units at the
+    same time; the smaller share is used.
 
     Parameters
     ----------
-    readings : of the units that answered
+    readings : readings of the units that answered
     """
     table = readings.pivot_table(index="record", columns="unit", values="unit_C").sort_index()
     soak = readings.drop_duplicates("record").set_index("record")["soak"].reindex(table.index).to_numpy()
@@ -255,17 +256,17 @@ def frozen(readings: pd.DataFrame) -> Iterator[tuple[str, int, float]]:
     for column, unit in enumerate(table.columns):
         if not known[:, column].all():
             continue
-        still = int(np.argmax(np.append(changed[::-1, column], True)))  # steps from the end on in which nothing changed
+        still = int(np.argmax(np.append(changed[::-1, column], True)))  # number of final steps without a change
         if still and _by_chance(changed & known, known & within[:, None], column, still) < BY_CHANCE:
             yield str(unit), still + 1, float(values[-1, column])
 
 
 def _by_chance(changed: Flags, counted: Flags, column: int, still: int) -> float:
-    """Probability that the reading of a sound thermometer stays equal for so long; 1 if unknown.
+    """Probability that the reading of a working thermometer is constant for ``still`` steps; 1 if unknown.
 
     Parameters
     ----------
-    changed, counted : (steps, units); a step within one soak is counted
+    changed, counted : (steps, units), whether the reading changed, and whether the step is within a soak
     """
     steps = len(changed)
     compared = counted[: steps - still, column]

@@ -1,4 +1,4 @@
-"""Verification on poses that the fit has not seen: | |a_corr| − g | of every unit, by dwell and by pose, and its uncertainty."""
+"""Verification in poses that are not fitted: | |a_corr| − g | of every unit, by dwell and by pose, and its uncertainty."""
 
 import numpy as np
 import pandas as pd
@@ -32,16 +32,16 @@ def verify(
 ) -> dict[str, pd.DataFrame]:
     """The remaining error of every verification dwell, and of every verification pose over its dwells, in µg.
 
-    ``error_ug`` is |a_corr| − g, which needs no angle; ``error_x_ug`` … compare with the table's angles too.
-    ``uncertainty_ug`` (k = 1) is the error expected of a correct model: white noise, wander since the dwells of the fit, and the
-    effect of both on the coefficients. ``reading_ug`` (k = 1) is the white noise of the dwell alone.
-    ``rms_uncertainty_x_ug`` … (k = 1), the same in all rows of a unit, belong to the RMS of ``error_x_ug`` … over its dwells;
-    ``rms_expected_x_ug`` … is that RMS of a correct model, and ``rms_dof_x`` … the degrees of freedom of its square.
+    ``error_ug`` is |a_corr| − g, independent of angles; ``error_x_ug`` … are differences from the force by the table angles.
+    ``uncertainty_ug`` (k = 1) is the standard deviation of the error of a correct model: white noise, wander since the fitted
+    dwells, and the effect of both on the coefficients. ``reading_ug`` (k = 1) is the white noise of the dwell alone.
+    ``rms_uncertainty_x_ug`` … (k = 1), equal in all rows of a unit, is the uncertainty of the RMS of ``error_x_ug`` … over its
+    dwells; ``rms_expected_x_ug`` … is the RMS of a correct model, and ``rms_dof_x`` … the degrees of freedom of its square.
 
-    In ``verification_poses`` the error is the mean over the dwells of one pose: the error that the calibration leaves; wander,
+    In ``verification_poses`` the error is the mean over the dwells of a pose: the error left by the calibration, while wander,
     which no calibration removes, is partly averaged out. Where the means at its soaks differ by more than their uncertainties
-    allow, it is that of the soak where it is largest: errors of opposite sign at two temperatures are no error of zero. Its
-    uncertainty is that of this mean, with the correlation of its dwells.
+    allow, it is that of the soak with the largest error: errors of opposite sign at two temperatures must not cancel. Its
+    uncertainty accounts for the correlation of the dwells.
     """
     return verify_tables(LotTables(dwells, history), coefficients, covariance, predictions)
 
@@ -53,12 +53,12 @@ def verify_tables(
     predictions: pd.DataFrame | Array,
     calibration: Calibration | None = None,
 ) -> dict[str, pd.DataFrame]:
-    """:func:`verify` of tables that other stages read as well.
+    """:func:`verify` of tables that are shared with other stages.
 
     Parameters
     ----------
-    predictions : the table, or the covariances (units, 3, m, m) that it holds, µg²
-    calibration : that of the tables, where other stages have read it already
+    predictions : the table, or its covariances (units, 3, m, m), µg²
+    calibration : the calibration of the tables, if other stages have read it already
     """
     if not np.any(tables.dwells["kind"] == "verification") or coefficients.empty:
         return nothing_verified()
@@ -93,7 +93,7 @@ def verify_tables(
 
 
 def sizes(force: Array) -> Array:
-    """Norm of forces (..., m), g; of a single axis the force along it, with its sign."""
+    """Norm of forces (..., m), g; for a single axis the signed force along it."""
     return force[..., 0] if force.shape[-1] == 1 else np.linalg.norm(force, axis=-1)
 
 

@@ -1,4 +1,4 @@
-"""Adapters by the family that a profile names: each module in ``families`` has the adapter of the family of its name."""
+"""Adapters by device family: each module in ``families`` has the adapter of the family it is named for."""
 
 import pkgutil
 from collections.abc import Callable
@@ -19,7 +19,7 @@ Adapter = TypeVar("Adapter", bound="TableAxis | ThermalChamber | Equipment")
 
 @cache
 def adapters() -> dict[str, type[TableAxis | ThermalChamber | Equipment]]:
-    """Every adapter by the name of its family, sorted; a module of ``families`` without exactly one is a defect."""
+    """Every adapter by the name of its family, sorted; raises LookupError for a module without exactly one adapter."""
     by_family: dict[str, type[TableAxis | ThermalChamber | Equipment]] = {}
     for module in pkgutil.iter_modules(families.__path__):
         content = vars(import_module(f"{families.__name__}.{module.name}")).values()

@@ -47,7 +47,7 @@ class Protection:
 
 @contextmanager
 def guarded(config: StationConfig, run: str) -> Generator[Protection]:
-    """A block in which no other run drives the station, and after which it is safe, even if this process is killed."""
+    """A block in which no other run can drive the station, and after which it is made safe, even if this process is killed."""
     folder = state_folder()
     leases = Leases(folder, new_holder(config.name, run), addresses(config), config.safety.lapse_s)
     leases.take()

@@ -1,4 +1,4 @@
-"""The parts of a station that are leased, and the notes beside the locks: the holder of each, written whole or not at all."""
+"""The parts of a station that are leased, and the notes beside the locks, which state the holder and are written atomically."""
 
 import ipaddress
 import json
@@ -30,7 +30,7 @@ KERNEL_NAMES = Path("/sys/dev/char")
 
 
 def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
-    """Addresses of table, chamber and reader of a station, in one form however the file writes them.
+    """Addresses of the parts of a station, normalised so that equal devices have equal addresses.
 
     every : include parts that share an address with another; a lease is taken once per address
     """
@@ -63,7 +63,7 @@ def _line(path: str) -> str:
 
 
 def _host(name: str) -> str:
-    """The IP address of a host; all addresses and names of this machine give one address."""
+    """The IP address of a host; all addresses and names of this machine give the loopback address."""
     try:
         addresses = {str(entry[4][0]) for entry in socket.getaddrinfo(name, None, type=socket.SOCK_STREAM)}
     except OSError:  # a name that cannot be resolved now stays the same name

@@ -39,7 +39,7 @@ BOTH = "two runs must not command one device"
 
 @dataclass
 class Leases:
-    """The leases of one holder on the parts of a station, all or none of them."""
+    """The leases of one holder on the parts of a station; either all or none are held."""
 
     folder: Path
     holder: Holder
@@ -111,7 +111,7 @@ class Leases:
     def beat(self) -> None:
         """Renews the heartbeat; a holder that was silent for longer than ``lapse_s`` has lost its leases."""
         with self._alone:
-            now = steady()  # before anything is written: a process may stand still in between
+            now = steady()  # taken before the writes, because the process may be stopped in between
             if self._gone():
                 return
             for part in list(self._locks):
@@ -121,12 +121,12 @@ class Leases:
             self._beaten = now
 
     def alive(self) -> None:
-        """Refuses after a silence in which the watchdog may have taken over the station."""
+        """Raises LeaseLost after a silence in which the watchdog may have taken over the station."""
         if self._gone():
             raise LeaseLost(self._lost)
 
     def require(self) -> None:
-        """Refuses where the leases are no longer the holder's, by its heartbeat or by locks and notes."""
+        """Raises LeaseLost if the leases no longer belong to the holder, by its heartbeat or by locks and notes."""
         with self._alone:
             self.alive()
             for part in list(self._locks):

@@ -1,6 +1,6 @@
-"""The run's side of its watchdog: starts the process, checks it with each heartbeat, replaces it where it is gone.
+"""The run's side of its watchdog: starts the process, checks it at each heartbeat, and replaces it if it has ended.
 
-:func:`start_module` and :func:`close_pipes` are also those of the keeper of a bring-up, ``stations/bringup/keeper.py``.
+:func:`start_module` and :func:`close_pipes` are also used by the keeper of a bring-up, ``stations/bringup/keeper.py``.
 """
 
 import json
@@ -33,7 +33,7 @@ MODULE = "stations.watchdog"  # started as a process, never imported: it stands 
 
 @dataclass
 class Watchdog:
-    """The watchdog process of this run; ``trouble`` says why it has none and will have none."""
+    """The watchdog process of this run; ``trouble``: reason why it has none and no further one is started."""
 
     config: StationConfig
     leases: Leases
@@ -66,7 +66,7 @@ class Watchdog:
         self._send(json.dumps(order).encode() + b"\n")
 
     def require_watching(self) -> None:
-        """Waits until the watchdog is ready; refuses where it does not become so."""
+        """Waits until the watchdog is ready; raises StationTimeout if it is not in time."""
         if not self._watches.wait(STARTS * START_S) or self.trouble:
             raise StationTimeout(self.trouble or f"watchdog: not ready after {STARTS * START_S:g} s")
 
@@ -127,7 +127,7 @@ class Watchdog:
                 )
 
     def _gone(self) -> str:
-        """Why the watchdog no longer watches; empty where it watches or is starting."""
+        """The reason why the watchdog no longer watches; empty if it watches or is starting."""
         status = None if self._process is None else self._process.poll()
         safety = self.config.safety
         if status is not None:

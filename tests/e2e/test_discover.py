@@ -173,7 +173,7 @@ def test_what_no_effect_is_like_is_said_with_its_map(tmp_path: Path, monkeypatch
     assert np.sqrt(np.mean(((left - share * expected) / error) ** 2)) < 2.0
     again = document_of(*options, status=0)
     assert (again["unexplained"], again["new"]) == (said["unexplained"], [])  # as found the night before
-    assert "no effect of the catalogue is like it" in page.read_text("utf-8")
+    assert "no effect of the catalogue explains it" in page.read_text("utf-8")
     (line,) = printed_commands(text := given(*options)[1])
     assert "differs by wafer, most in W02" in text
     assert "has the largest evidence" in text_of(*line, status=0)

@@ -1,4 +1,4 @@
-"""Data faults, one kind per file, which must be corrected before effects are diagnosed; every file of the package takes part."""
+"""Data faults, one kind per file, which must be corrected before effects are diagnosed; every file of the package is used."""
 
 from functools import cache
 from importlib import import_module
@@ -10,7 +10,7 @@ from inertial.data_errors.readings import Readings
 
 @cache
 def looks() -> tuple[Look, ...]:
-    """Every test of this package, in the order in which they decide."""
+    """Every test of this package, in order of priority."""
     modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
     return tuple(sorted((m.LOOK for m in modules if hasattr(m, "LOOK")), key=lambda look: look.order))
 
@@ -27,7 +27,7 @@ def names_of_missing() -> frozenset[str]:
 
 
 def find_faults(readings: Readings) -> list[Fault]:
-    """Data faults of a lot, at most one kind per unit, of the first test that finds one; a unit without one can be diagnosed."""
+    """Data faults of a lot, at most one per unit, by the first test that finds one; units without a fault can be diagnosed."""
     faults: dict[int, Fault] = {}
     for look in looks() if readings.turned else looks_in_one_pose():
         for fault in look.find(readings):

@@ -13,7 +13,7 @@ def dropped(readings: Readings) -> Iterator[Fault]:
     """Dwells with fewer samples than the lot has there, or than their duration holds."""
     if readings.count is None:
         return
-    if len(readings.count) > 2 and not _of_own_lengths(readings):
+    if len(readings.count) > 2 and not _durations_differ(readings):
         expected = np.nanmedian(readings.count, axis=0, keepdims=True)
     elif readings.duration is not None:
         rate = np.nanmedian(readings.count / np.maximum(readings.duration, 1e-9), axis=1, keepdims=True)
@@ -29,8 +29,8 @@ def dropped(readings: Readings) -> Iterator[Fault]:
             yield Fault("dropped_samples", unit, tuple(dwells.tolist()), evidence)
 
 
-def _of_own_lengths(readings: Readings) -> bool:
-    """Whether dwells of one number last differently long in different units, as where a unit's dwells were numbered again."""
+def _durations_differ(readings: Readings) -> bool:
+    """Whether dwells of the same number differ in duration between units, as if a unit's dwells had been renumbered."""
     if readings.duration is None:
         return False
     usual = np.nanmedian(readings.duration, axis=0, keepdims=True)

@@ -12,7 +12,7 @@ from inertial.data_errors.readings import Readings
 class Fault:
     """A data fault of one unit: its name, its dwells, and the evidence.
 
-    Units and dwells are indices in the lot; in the evidence, too: ``{unit[1]}``, ``{dwell[32]}``.
+    Units and dwells are indices in the lot, also in the text of the evidence: ``{unit[1]}``, ``{dwell[32]}``.
     """
 
     name: str
@@ -30,10 +30,10 @@ class Look:
     """A test for one kind of data fault, the ``LOOK`` of its file.
 
     find : the faults in the readings of a lot
-    names : of the faults that it finds
-    order : of two tests that find one in a unit the lower decides
-    order_in_one_pose : its order for a record in one pose, whose response is unknown and whose output may repeat; None: no test
-    of_missing : whether what it finds may be the dwells alone that a unit lacks
+    names : names of the faults that it finds
+    order : priority; if several tests find a fault in a unit, the one with the lowest order is reported
+    order_in_one_pose : priority for a record in one pose, with unknown response and possibly repeated outputs; None: not used
+    of_missing : whether a fault may consist only of dwells that the unit lacks
     """
 
     find: Callable[[Readings], Iterator[Fault]]
@@ -44,5 +44,5 @@ class Look:
 
 
 def missing_dwells(readings: Readings, unit: int) -> tuple[int, ...]:
-    """Places of the dwells that a unit lacks and other units have."""
+    """Indices of the dwells that a unit lacks and other units have."""
     return tuple(np.flatnonzero(~readings.there[unit]).tolist())

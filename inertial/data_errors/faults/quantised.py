@@ -10,10 +10,10 @@ from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Array, Readings
 
 _DEGREE = 4
-"""Degree of the polynomial of a driver that the scatter of dwells may follow."""
+"""Degree of the polynomials of temperature and time that are fitted to the scatter of the dwells."""
 
 _DWELLS_EACH = 8
-"""Dwells for each column of these."""
+"""Smallest number of dwells per column of these."""
 
 _MOST_STEPS = 20_000
 """Steps over the range of the means beyond which the step cannot be estimated from these dwells."""
@@ -33,19 +33,17 @@ def quantised(readings: Readings) -> Iterator[Fault]:
                 break
             coarse = _coarse_step(readings, unit, axis)
             if coarse is not None:
-                evidence = (
-                    f"the scatter of axis {'xyz'[sensed]} follows where its mean lies between steps of {coarse:.4g}"
-                )
-                yield Fault("quantised", unit, (), f"{evidence}: the samples jump between two of them")
+                evidence = f"the scatter of axis {'xyz'[sensed]} depends on its mean with a period of {coarse:.4g}"
+                yield Fault("quantised", unit, (), f"{evidence}: the samples jump between two steps of a converter")
                 break
 
 
 def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
     """Step of a converter that is coarser than the noise of a sample; None where there is none.
 
-    With steps q well above the noise, samples take the two next values: their variance is q²·p·(1 − p), p the position of
-    the mean between the two, and it repeats with every step. Noise that grows with temperature, or in time, is no such scatter:
-    the means follow the temperature too, and some step fits both. What follows either is left out.
+    With steps q well above the noise, the samples take the two nearest values: their variance is q²·p·(1 − p), where p is the
+    position of the mean between the two, and is periodic in the mean with period q. Noise that grows with temperature or time
+    could be mistaken for it, because the means depend on temperature, too; its dependence on either is removed first.
     """
     if readings.spread is None or readings.count is None:
         return None
@@ -80,7 +78,7 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
 
 
 def _without_drivers(readings: Readings, unit: int, there: Flags, values: Array) -> Array:
-    """Values of the dwells that are there, less their mean and what follows the temperature or the time."""
+    """Residuals of values of the present dwells after a fit of polynomials in temperature and time."""
     unit_ranges: list[Array] = []
     for driver in (readings.warm, readings.time):
         if driver is None:
@@ -89,7 +87,7 @@ def _without_drivers(readings: Readings, unit: int, there: Flags, values: Array)
         if np.isfinite(measured).all() and np.ptp(measured) > 0.0:
             unit_ranges.append(2.0 * (measured - measured.min()) / np.ptp(measured) - 1.0)
     powers = [unit_range**k for k in range(1, _DEGREE + 1) for unit_range in unit_ranges]
-    # few dwells: many columns would take up the steps of a converter, too
+    # for few dwells, many columns would also absorb the pattern of the converter's steps
     x = np.stack([np.ones(values.size), *powers[: values.size // _DWELLS_EACH]], axis=1)
     left: Array = values - x @ np.linalg.lstsq(x, values, rcond=1e-9)[0]
     return left
@@ -104,7 +102,7 @@ def _white(readings: Readings, unit: int, axis: int) -> float | None:
 
 
 def lattice_step(values: Array) -> float | None:
-    """Step of the lattice that all values lie on, by Euclid's algorithm with a tolerance; None where they lie on none."""
+    """Step of the lattice that contains all values, by Euclid's algorithm with a tolerance; None if there is no such lattice."""
     distinct = np.unique(values)
     if distinct.size < 3:
         return None

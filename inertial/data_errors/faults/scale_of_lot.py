@@ -9,9 +9,9 @@ from inertial.data_errors.readings import Readings
 
 
 def scale_units(readings: Readings) -> Iterator[Fault]:
-    """A unit whose scale is far from that on which more than half of the units agree.
+    """A unit whose scale differs from the scale on which more than half of the units agree.
 
-    Where no such half is, the lot is of several ranges or sensitivities, and no unit of it is the odd one.
+    Without such a majority the lot has several ranges or sensitivities, and no unit is reported.
     """
     scale = readings.scale
     alone = np.ones(scale.size) if readings.unit_name == "g" else scale

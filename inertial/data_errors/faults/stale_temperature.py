@@ -9,7 +9,7 @@ from inertial.data_errors.readings import Array, Readings
 
 
 def stale(readings: Readings) -> Iterator[Fault]:
-    """A thermometer that repeats itself to the last digit while the temperature moves, or while it had noise before."""
+    """A thermometer that repeats a value to the last digit although the temperature changes, or although it had noise before."""
     if readings.temperature is None:
         return
     for unit, row in enumerate(readings.temperature):
@@ -34,7 +34,7 @@ def _noisy_steps(steps: Array) -> bool:
 
 
 def _moved_elsewhere(readings: Readings, unit: int, stretch: slice) -> float:
-    """Change of the chamber, or of the other units, in the meantime, K."""
+    """Change of the temperature of the chamber, or of the other units, during the stretch, K."""
     moves = [0.0]
     if readings.chamber is not None:
         moves.append(float(np.ptp(readings.chamber[unit, stretch])))
@@ -45,6 +45,7 @@ def _moved_elsewhere(readings: Readings, unit: int, stretch: slice) -> float:
 
 
 def _longest_repeat(row: Array) -> tuple[int, int]:
+    """First dwell and length of the longest run of equal values."""
     best, start = (0, 0), 0
     for dwell in range(1, row.size + 1):
         if dwell == row.size or row[dwell] != row[start]:

@@ -10,13 +10,13 @@ from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
 _COARSE = 2.0
-"""Multiple of a large scatter within which the code without scatter is the one that belongs to the pose.
+"""Misfit over a large scatter up to which an output without scatter still follows the pose.
 
-The samples of a dwell that lies midway between two codes, a step q apart, scatter by q/2; a dwell of one code is at most q/2 off.
+Samples of a dwell midway between two codes, a step q apart, scatter by q/2; the misfit of a dwell with one code is at most q/2.
 """
 
 _LARGE = 0.9
-"""Quantile of the scatters of an axis that counts as a large one: at steps of eight times the noise, a fifth are of two codes."""
+"""Quantile of an axis' scatters that counts as large: at steps of eight times the noise, a fifth of the dwells have two codes."""
 
 
 def stuck(readings: Readings) -> Iterator[Fault]:
@@ -42,7 +42,7 @@ def stuck(readings: Readings) -> Iterator[Fault]:
 
 
 def _still(readings: Readings, unit: int) -> Places:
-    """Dwells in which an axis has no scatter although it has in most: the means of equal samples differ by rounding."""
+    """Dwells in which an axis has no scatter (up to rounding) although it has in most."""
     if readings.spread is None or readings.count is None:
         return np.zeros(0, dtype=np.intp)
     spread = np.where((readings.count[unit] > 2.0)[:, None], readings.spread[unit], np.nan)
@@ -51,7 +51,7 @@ def _still(readings: Readings, unit: int) -> Places:
     usual, large = np.nanquantile(spread, (0.5, _LARGE), axis=0)
     still = (spread < 1e-6 * usual) & (usual > 0.0)
     if readings.turned:
-        # samples between two steps of a coarse converter are all one code, which follows the pose: that axis is not stuck
+        # a coarse converter gives the same code for all samples of a dwell; it changes with the pose, so it is not stuck
         still &= ~(np.abs(readings.misfit_when_warm[unit]) * readings.scale[unit] < _COARSE * large)
     return np.flatnonzero(np.any(still, axis=-1))
 

@@ -1,4 +1,4 @@
-"""Single dwells that two units have of each other."""
+"""Single dwells whose readings were exchanged between two units."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ _AWAY = 0.005
 
 
 def swapped_units(readings: Readings) -> Iterator[Fault]:
-    """Dwells that two units' fingerprints say were exchanged between them."""
+    """Dwells exchanged between two units, recognised by the units' calibrations."""
     units, n = readings.there.shape
     if units < 2:
         return

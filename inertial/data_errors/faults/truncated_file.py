@@ -8,16 +8,16 @@ from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
 ENDS_EARLY = 3
-"""Dwells that the lot has after the last one of a unit, from which on the unit's record ends in the middle.
+"""Smallest number of dwells missing at the end of a unit's record for which the record counts as truncated.
 
-One or two at the end are as likely missing as any others; a change within the last three could not be seen either.
+One or two missing at the end are as likely as any others; a change within the last three would not be visible either.
 """
 
 MOST_MISSING = 0.5
-"""Share of the dwells up to which a unit may lack some and is judged by the others.
+"""Largest share of missing dwells at which a unit is judged by its other dwells.
 
-Derived: a plan has at least two dwells per coefficient as a rule, so that half of them still determine the model; a unit that
-has less than half of its dwells weighs less in the lot than what is unknown about the cause.
+Derived: a plan usually has at least two dwells per coefficient, so that half of them still determine the model; a unit with fewer
+contributes less to the lot than the unknown cause puts at risk.
 """
 
 
@@ -42,10 +42,9 @@ def truncated(readings: Readings) -> Iterator[Fault]:
 
 
 def _after_end(readings: Readings, unit: int) -> float:
-    """How many dwells the lot has after the end of a unit's record: by their numbers, and by the times of the other units.
+    """Number of dwells of the lot after the end of a unit's record: the smaller of the counts by dwell numbers and by times.
 
-    Dwells that were numbered again without the missing ones end with the record of the others, and a clock that runs back ends
-    with its last number.
+    Dwells renumbered without gaps end at the time of the others, and a clock that runs backwards ends at their last number.
     """
     row = readings.there[unit]
     others = np.delete(readings.time, unit, axis=0)
@@ -60,7 +59,7 @@ def _after_end(readings: Readings, unit: int) -> float:
 
 
 def _cut_off(readings: Readings) -> bool:
-    """Whether the temperature's history runs on far behind the last dwell, which ends in the middle of a round of poses."""
+    """Whether the temperature history continues long after the last dwell, which is in the middle of a round of poses."""
     time = np.nanmedian(readings.time, axis=0)
     if readings.history_end is None or readings.history_end - time[-1] < 0.15 * float(np.ptp(time)):
         return False

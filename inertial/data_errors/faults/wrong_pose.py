@@ -10,7 +10,7 @@ from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import FAR_G, Array, Readings
 
 _COMMON = 5.0
-"""Multiple of the usual misfit that half of the units exceed in a dwell whose pose is wrong for all."""
+"""Median over the units of the misfit over the usual one, from which on the pose of a dwell is wrong for all units."""
 
 
 def wrong_poses(readings: Readings) -> Iterator[Fault]:
@@ -23,7 +23,7 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         # an error of most units belongs to the plan or the table: the search for effects reports it
         ratio = np.nanmedian(size / np.where(typical > 0.0, typical, np.inf), axis=0, keepdims=True)
         out &= ratio < _COMMON
-    # of two units that were exchanged the search for effects reports it, too
+    # exchanged units are also left to the search for effects
     swapped = set(_exchanged(readings)) if out.any() else set[int]()
     for unit, row in enumerate(out):
         dwells = np.flatnonzero(row)
@@ -49,7 +49,7 @@ def _exchanged(readings: Readings) -> Iterator[int]:
 
 
 def _felt(readings: Readings, unit: int, dwells: Places) -> Array:
-    """Specific force that the outputs at some dwells stand for, (k, 3), g."""
+    """Specific force, (k, 3), g, from the outputs of some dwells by the unit's calibration."""
     fit = readings.fits[unit]
     return (np.linalg.pinv(fit[:, 1:]) @ (readings.output[unit, dwells] - fit[:, 0]).T).T
 

@@ -1,4 +1,4 @@
-"""Handling errors, the alternatives to effects, one per file; every file of the package takes part."""
+"""Handling errors, the alternatives to effects, one per file; every file of the package is used."""
 
 from functools import cache
 from importlib import import_module

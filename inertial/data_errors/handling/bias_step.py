@@ -6,10 +6,10 @@ from inertial.estimation.lot import Lot
 
 
 class BiasStep(OfOneUnit, Change):
-    """One unit whose bias is another on all axes from a dwell on, and no other unit's.
+    """One unit whose bias changes on all axes from a dwell on, unlike that of any other unit.
 
-    A unit that was taken out and put back has another stress in its case, a unit that fell has another bias. As the jumps of
-    three axes it would need three dwells of change, as an effect the coefficients of all units.
+    The case of a unit that was taken out and put back is under different stress, and a unit that fell has a different bias. As
+    jumps of three axes it would need three locations, as an effect coefficients of all units.
     """
 
     id = "bias_step"

@@ -5,13 +5,13 @@ from inertial.estimation.alternative import Array, soaks
 from inertial.estimation.lot import Lot
 
 _FEWEST = 3
-"""Soaks from which it is not the same as a bias with a temperature coefficient."""
+"""Smallest number of soaks: with two it is equivalent to a bias with a temperature coefficient."""
 
 
 class BiasUnsteady(OfOneAxis):
-    """One axis of one unit whose bias changed from soak to soak by itself, and no other unit's.
+    """One axis of one unit whose bias changed from soak to soak, unlike that of any other unit.
 
-    Slow telegraph noise of one sensor that stays at one level over a soak has the shape of any curve over temperature.
+    Slow telegraph noise of one sensor, constant within each soak, can imitate any curve over temperature.
     """
 
     id = "bias_unsteady"

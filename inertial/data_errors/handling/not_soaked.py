@@ -7,16 +7,16 @@ from inertial.estimation.alternative import Array, Handling, Misfit
 from inertial.estimation.lot import Lot
 from inertial.state import History, State
 
-_FASTEST, _SLOWEST, _GRID = 30.0, 3000.0, 12  # s, s, values of the time constant
-_BETWEEN = 9  # values between two of the grid
-_SPREAD = 3.0  # factor within which each unit's own time constant is looked for
-_EXACT = 1e-3  # of the logarithm of a time constant
+_FASTEST, _SLOWEST, _GRID = 30.0, 3000.0, 12  # s, s, number of values of the time constant
+_BETWEEN = 9  # number of refined values around one of the grid
+_SPREAD = 3.0  # factor within which the time constant of each unit is searched
+_EXACT = 1e-3  # tolerance of the logarithm of a time constant
 
 
 class NotSoaked(Handling):
-    """Temperatures of the devices that relax to what was read with one time constant, for all units.
+    """Temperatures of the devices that relax to the reading with one time constant, for all units.
 
-    What was read is the air, or a plate: the output follows the device, T_d' = (T − T_d)/τ, by the coefficients that it has.
+    The thermometer measures the air or a plate; the device follows, T_d' = (T − T_d)/τ, and the output depends on T_d.
     """
 
     id = "device_not_soaked"
@@ -26,8 +26,8 @@ class NotSoaked(Handling):
     hides_behind = ("thermal_lag",)
     fewest_units = 1
     in_part = False
-    # the output follows by the coefficients that it has: a delay in a fiftieth of them, or against them, is an effect with a lag
-    # of its own; with the temperatures delayed after that the residuals would grow
+    # a delay in a fiftieth of the temperature coefficients, or of opposite sign, is an effect with a lag of its own: correcting
+    # the temperatures for it would increase the residuals
     of_one = 3.0
 
     def locations(self, lot: Lot) -> list[dict[str, float]]:
@@ -43,7 +43,7 @@ class NotSoaked(Handling):
         return [{**location, "tau": location["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
 
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
-        """What being behind adds, by each unit's own coefficients: one where they are known exactly."""
+        """Contribution of the temperature lag by each unit's coefficients; its size is 1 if these are known exactly."""
         units, n = lot.state.time.shape
         if slope is None:
             return np.zeros((units, n, len(lot.state.axes), 1))
@@ -55,13 +55,13 @@ class NotSoaked(Handling):
         alone = "unit" in location
         behind = behind[int(location["unit"])] if alone else behind
         return (
-            f"{'the unit follows' if alone else 'the devices follow'} the temperature that was read with a time constant "
+            f"{'the unit follows' if alone else 'the devices follow'} the temperature reading with a time constant "
             f"of {location['tau']:.0f} s, up to {float(behind.max()):.1f} K behind it; soak longer, or measure "
             "the device's temperature"
         )
 
     def settled(self, lot: Lot, size: Array, misfit: Misfit, **location: float) -> Lot | None:
-        """With the temperatures of the devices in place of the readings, each unit's time constant found by its own dwells."""
+        """With the temperatures of the devices instead of the readings; the time constant is fitted for each unit."""
         from scipy.optimize import minimize_scalar  # noqa: PLC0415  # a quarter of a second, and few lots need it
 
         each = np.zeros(lot.state.time.shape[0])
@@ -79,7 +79,7 @@ class NotSoaked(Handling):
 
 
 def delayed(state: State, tau: Array) -> State:
-    """A state whose temperatures are a first-order lag behind those that were read, by time constants (units,), s; 0: as read."""
+    """The state with temperatures that follow the readings with time constants (units,), s; zero: the readings."""
     if state.temperature is None:
         return state
     history = state.history
@@ -97,7 +97,7 @@ def _lag(time: Array, temperature: Array, tau: Array) -> Array:
 
 
 def _temperature(state: State, tau: float) -> Array:
-    """Temperatures of the devices at the dwells, (units, n), °C; as read for a time constant of zero."""
+    """Temperatures of the devices at the dwells, (units, n), °C; the readings for a time constant of zero."""
     return state.temperature_operator(
         ("device_not_soaked", tau), lambda time, value: operators.first_order_lag(time, value, tau) if tau else value
     )

@@ -6,7 +6,7 @@ from inertial.estimation.lot import Lot
 
 
 class PoseOff(DirectionOff):
-    """A pose that is wrong every time, for all units."""
+    """A pose that is wrong in all its dwells, for all units."""
 
     id = "pose_off"
     equation = "∂f/∂α·Δα + ∂f/∂β·Δβ in every dwell of one pose"

@@ -6,17 +6,17 @@ from inertial.estimation.alternative import Array, Handling, common_force
 from inertial.estimation.lot import Lot
 
 _APART = 0.05
-"""Distance of two forces, g, from which on their poses are different ones."""
+"""Distance of two forces, g, above which they belong to different poses."""
 
 
 class PosesExchanged(Handling):
-    """Poses of two successive dwells that were written down in the wrong order, for all units: no coefficient but one."""
+    """Poses of two successive dwells recorded in the wrong order, for all units; its only possible coefficient is 1."""
 
     id = "poses_exchanged"
     symbol = "a ↔ b"
     equation = "f_b − f_a in dwell a, the opposite in dwell b"
     breaker = "the log of the table, or both poses once more"
-    of_one = 1.25  # a part of the way between two poses is no exchange
+    of_one = 1.25  # an exchange changes the force by the full difference of the poses
 
     def locations(self, lot: Lot) -> list[dict[str, float]]:
         """Each dwell whose successor has another pose."""

@@ -5,11 +5,11 @@ from inertial.estimation.alternative import Array, Handling, common, tilts
 from inertial.estimation.lot import Lot
 
 _LOADS = 20
-"""Largest number of loads of a side at which the coupling may give way."""
+"""Largest number of candidate loads on each side at which the coupling may slip."""
 
 
 class SlipsUnderLoad(Handling):
-    """A coupling of the outer axis that gives way where the load turns it hardest: these poses are off by one angle."""
+    """A coupling of the outer axis that slips at the largest torques: all poses beyond a load have the same angle error."""
 
     id = "slips_under_load"
     symbol = "εα(α)"
@@ -19,9 +19,9 @@ class SlipsUnderLoad(Handling):
     fewest_units = 1
 
     def locations(self, lot: Lot) -> list[dict[str, float]]:
-        """Loads of either side between those of the poses, that less than half of the dwells exceed.
+        """Loads of either sign, between those of the poses, that fewer than half of the dwells exceed.
 
-        None where the angles are not known, or not the same for all units.
+        Empty where the angles are unknown or differ between units.
         """
         if lot.state.outer is None or lot.state.inner is None or len(common(lot.state.outer)) > 1:
             return []
@@ -36,7 +36,7 @@ class SlipsUnderLoad(Handling):
         return found
 
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
-        """What the angle adds in the poses beyond the load."""
+        """The change of force by the outer angle in the poses beyond the load."""
         return tilts(lot.state)[..., :1] * _overloaded(lot, **location)[:, None, None]
 
     def dwells(self, lot: Lot, **location: float) -> list[int]:
@@ -44,13 +44,13 @@ class SlipsUnderLoad(Handling):
         return np.flatnonzero(_overloaded(lot, **location)).tolist()
 
     def describe(self, lot: Lot, size: Array, **location: float) -> str:
-        """The angle, and where it is off."""
+        """The angle error, and the poses that have it."""
         where = f"{'' if location['side'] > 0.0 else '-'}sin(outer) exceeds {location['load']:.2f}"
         return f"the outer angle is off by {np.degrees(size[0]):+.4f}° in the poses where {where}, for all units"
 
 
 def _load(lot: Lot, side: float) -> Array:
-    """Torque of a load that the outer axis turns about, as a share of the largest, (n,), on one side."""
+    """Torque of the load about the outer axis over the largest, (n,), with the sign of one side."""
     return side * np.sin(lot.state.need("outer", SlipsUnderLoad.id).reshape(-1, lot.state.time.shape[-1])[0])
 
 

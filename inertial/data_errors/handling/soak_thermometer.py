@@ -22,7 +22,7 @@ class SoakThermometer(Handling):
         return [{"soak": float(k)} for k in range(number)] if number > 2 else []
 
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
-        """The contribution of an offset of one kelvin, by each unit's own coefficients."""
+        """The contribution of an offset of one kelvin, by each unit's temperature coefficients."""
         if slope is None:
             return np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
         return -(slope * (soaks(lot.state) == int(location["soak"]))[:, None])[..., None]
@@ -31,7 +31,7 @@ class SoakThermometer(Handling):
         return f"the thermometers read {self.short(size, **location)}; the readings are corrected by it"
 
     def instead(self, lot: Lot, **location: float) -> list[dict[str, float]]:
-        """The other soaks: with three, an offset of one is one of another beside coefficients that are linear in temperature."""
+        """The other soaks: with three soaks and linear coefficients, an offset in one is equivalent to one in another."""
         number = int(soaks(lot.state).max()) + 1
         return [{**location, "soak": float(k)} for k in range(number) if k != int(location["soak"])]
 

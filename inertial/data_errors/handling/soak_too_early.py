@@ -7,14 +7,17 @@ from inertial.estimation.lot import Lot
 from inertial.state import History
 
 _TAUS = 5  # values of the time constant in the first search
-_BETWEEN = 9  # values between two of them
-_SHARES = (0.05, 1.5)  # of the soak: shortest and longest time constant; a longer one is an offset of the thermometers
+_BETWEEN = 9  # number of refined values around one of them
+_SHARES = (
+    0.05,
+    1.5,
+)  # shortest and longest time constant over the soak's duration; a longer one is a thermometer offset
 
 
 class SoakTooEarly(Handling):
-    """A soak that is measured before the elements have the temperature that is read: their gap fades with one time constant.
+    """A soak measured before the sensing elements reach the temperature reading: the gap decays with one time constant.
 
-    The output follows the element by the coefficients that it has, T + ΔT₀·exp(−(t − t₀)/τ) from the first dwell of the soak.
+    The output depends on the element's temperature, T + ΔT₀·exp(−(t − t₀)/τ) from the first dwell of the soak on.
     """
 
     id = "soak_too_early"
@@ -42,7 +45,7 @@ class SoakTooEarly(Handling):
         return [{**location, "tau": location["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
 
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
-        """The contribution of a gap of one kelvin at the first dwell, by each unit's own coefficients."""
+        """The contribution of a gap of one kelvin at the first dwell, by each unit's temperature coefficients."""
         if slope is None:
             return np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
         fading = _fading(lot, lot.state.time, np.full(len(lot.state.time), location["tau"]), location["soak"])
@@ -50,12 +53,12 @@ class SoakTooEarly(Handling):
 
     def describe(self, lot: Lot, size: Array, **location: float) -> str:
         return (
-            f"soak {int(location['soak']) + 1} was measured too early: the elements began it {size[0]:+.2f} K from what was "
-            f"read, and followed with a time constant of about {location['tau']:.0f} s"
+            f"soak {int(location['soak']) + 1} was measured too early: the sensing elements began it {size[0]:+.2f} K from the "
+            f"reading and approached it with a time constant of about {location['tau']:.0f} s"
         )
 
     def settled(self, lot: Lot, size: Array, misfit: Misfit, **location: float) -> Lot | None:
-        """With the elements' temperatures in place of the readings: each unit's gap and time constant by its own dwells."""
+        """With the elements' temperatures instead of the readings; gap and time constant are fitted for each unit."""
         from scipy.optimize import minimize  # noqa: PLC0415  # a quarter of a second, and few lots need it
 
         gaps, taus = np.full(len(lot.state.time), float(size[0])), np.full(len(lot.state.time), location["tau"])

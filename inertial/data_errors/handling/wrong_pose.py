@@ -6,7 +6,7 @@ from inertial.estimation.lot import Lot
 
 
 class WrongPose(DirectionOff, OfOneDwell):
-    """A pose that the table missed once, for all units."""
+    """A pose that the table missed in one dwell, for all units."""
 
     id = "wrong_pose"
     equation = "∂f/∂α·Δα + ∂f/∂β·Δβ in one dwell"

@@ -1,4 +1,4 @@
-"""A certificate's XML against the archive: the document is made again from the archive, and the two are compared whole."""
+"""A certificate's XML against the archive: the document is generated again from the archive and compared completely."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -27,11 +27,11 @@ NONE = ("", "", "")
 class Compared:
     """The comparison of a certificate with the archive.
 
-    known : whether the ledger has its number; ended : why it is not valid any more, empty where it is
-    until : until when it is valid and what comes then, where that is known already
-    different : sentences about what differs; count : texts and numbers that were compared
-    reason : why the document could not be made again, empty where it was
-    unproven : what the archive cannot know, in one line; empty where the laboratory's file was given
+    known : whether the ledger has its number; ended : reason why it is no longer valid, empty if it is
+    until : end of its validity and what follows, if that is known already
+    different : sentences about the differences; count : number of texts and numbers that were compared
+    reason : reason why the document could not be generated again, empty if it was
+    unproven : statements that the archive cannot prove, in one line; empty if the laboratory's file was given
     """
 
     known: bool
@@ -49,14 +49,14 @@ def compare(root: Any, facts: CertificateFacts, archive: Archive, who: Laborator
     Parameters
     ----------
     root : the root element of its XML; facts : what it states
-    who : the laboratory's file; where None its texts are taken from the document and told as not proven
+    who : the laboratory's file; if None, its texts are taken from the document and reported as not proven
     """
     known = Ledger(archive).calibrations(facts.serial) if facts.serial else []
     calibration = next((entry for entry in known if entry.certificate == facts.number), None)
     if calibration is None:
         return Compared(known=False)
     try:
-        made = _made_again(root, Run(archive, calibration.run), calibration, known, who)
+        made = _generated_again(root, Run(archive, calibration.run), calibration, known, who)
     except ValidationError as problem:
         text = f"{'.'.join(map(str, problem.errors()[0]['loc']))}: {problem.errors()[0]['msg']}".removeprefix(": ")
         return Compared(True, *_ended(calibration), (f"what the file says of the laboratory is not allowed: {text}",))
@@ -72,10 +72,10 @@ def compare(root: Any, facts: CertificateFacts, archive: Archive, who: Laborator
     return Compared(True, *_ended(calibration), tuple(_different(root, expected[0].getroot())))
 
 
-def _made_again(
+def _generated_again(
     root: Any, run: Run, calibration: Calibration, known: list[Calibration], who: LaboratoryFile | None
 ) -> list[CertificateContent]:
-    """The document of the day of issue, and, where the certificate was replaced since, the document that names its successor."""
+    """The document as issued, and, if the certificate was replaced since, the document that names its successor."""
     first = compose(run, replace(calibration, ended_by=None), known, who or NOBODY)
     if who is None:
         laboratory = laboratory_in(root, first)
@@ -88,7 +88,7 @@ def _made_again(
 
 
 def _other_entry(facts: CertificateFacts, calibration: Calibration) -> tuple[str, ...]:
-    """Differences of a document from its entry in the ledger, where the document cannot be made again."""
+    """Differences of a document from its entry in the ledger, for a document that cannot be generated again."""
     entries = (
         ("run", facts.run, calibration.run),
         ("SHA-256 of the coefficients", facts.coefficients, calibration.event.coefficients),
@@ -123,13 +123,13 @@ def _line(found: tuple[str, str, str], expected: tuple[str, str, str]) -> str:
 
 
 def _short(text: str, common: int = 0) -> str:
-    """A text from shortly before its first difference on."""
+    """An excerpt of a text, starting shortly before its first difference."""
     excerpt = " ".join(f"{'…' if common > 20 else ''}{text[max(0, common - 20) :]}".split())
     return f"'{excerpt[:LONGEST]}{'…' if len(excerpt) > LONGEST else ''}'" if excerpt else "nothing"
 
 
 def _nodes(root: Any) -> Iterator[tuple[str, str, str]]:
-    """Every element, attribute and text of a document in order: tag, text, and a label that a reader knows."""
+    """Every element, attribute and text of a document in order: tag, text, and a label for messages."""
     for element in root.iter():
         if not isinstance(element.tag, str):
             yield "comment or instruction", str(element.text), "comment or instruction"
@@ -154,7 +154,7 @@ def _named(element: Any) -> str:
 
 
 def _ended(calibration: Calibration) -> tuple[str, str]:
-    """Why a calibration is not valid any more, and until when it still is where its end is known; each may be empty."""
+    """The reason why a calibration is no longer valid, and the end of one that is still valid; each may be empty."""
     by = calibration.ended_by
     if by is None:
         return "", ""
@@ -200,17 +200,17 @@ NOBODY = LaboratoryFile.model_validate(
         "item": {"manufacturer": "-"},
     }
 )
-"""Stands in place of the laboratory's file for what the archive alone says."""
+"""Placeholder for the laboratory's file, to generate a document from the archive alone."""
 
 
 def laboratory_in(root: Any, archived: CertificateContent) -> LaboratoryFile:
-    """The laboratory's file as a document states it; whatever the archive says itself is taken from the archive.
+    """The laboratory's file as stated by a document, without texts that come from the archive.
 
-    A document that is made with it from the archive is the same as this one if nothing but these texts can have been changed.
+    If the document generated with it from the archive equals this one, only these texts can have been changed.
 
     Parameters
     ----------
-    archived : what the archive says, of :data:`NOBODY`
+    archived : content of the certificate from the archive, made with :data:`NOBODY`
 
     Raises
     ------
@@ -245,7 +245,7 @@ def laboratory_in(root: Any, archived: CertificateContent) -> LaboratoryFile:
 
 
 def said_by(who: LaboratoryFile) -> str:
-    """All that a laboratory's file says, table by table, in one line."""
+    """All statements of a laboratory's file, table by table, in one line."""
     tables = who.model_dump(mode="json", exclude_none=True)
     return "; ".join(f"{name}: {', '.join(_values(table))}" for name, table in tables.items() if _values(table))
 

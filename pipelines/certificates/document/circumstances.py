@@ -30,7 +30,7 @@ SOURCES = {
 
 
 def source_words(text: str) -> str:
-    """The source of a contribution without the names of tables and keys in files."""
+    """The source of a contribution as text, without names of tables and keys of files."""
     for table, words in SOURCES.items():
         text = text.replace(table, words)
     return text
@@ -50,7 +50,7 @@ def standard_of(reference: Reference) -> content.ReferenceStandard:
 
 
 def entries_of(run: Run, covers: str) -> dict[str, bool]:
-    """The entries of [uncertainty] that the results rest on, and whether each names a standard; of several bands all must."""
+    """The entries of [uncertainty] that the results use, and whether each names a standard (in all bands of an entry)."""
     terms = Uncertainty.model_validate(run.manifest("budget")["parameters"].get("uncertainty") or {})
     named: dict[str, bool] = {}
     roles = {STATIC if kind == STATIC else PROCEDURES[kind].roles[0] for kind in covers.split()}
@@ -81,11 +81,11 @@ def traceability(budget: StatedBudget, entries: dict[str, bool]) -> str:
 
 
 def left_out_words(run: Run, held: Sequence[str]) -> str:
-    """The contributions that the statement of the references lacks: U counts them as zero; and what the poses do not show.
+    """A text with the contributions that are not stated, which U counts as zero, and the misalignments that are not determined.
 
     Parameters
     ----------
-    held : directions in which the poses do not show the response across
+    held : directions whose misalignment the poses do not determine
     """
     terms = run.manifest("budget")["parameters"].get("uncertainty") or {}
     names = left_out(Uncertainty.model_validate(terms))
@@ -98,7 +98,7 @@ def left_out_words(run: Run, held: Sequence[str]) -> str:
 def methods(
     run: Run, serial: str, recipe: dict[str, Any], who: LaboratoryFile, compared: Sequence[str], *, static: bool
 ) -> Iterator[str]:
-    """The laboratory's procedure, the static calibration, and the comparisons."""
+    """Sentences on the laboratory's procedure, the static calibration, and the comparisons."""
     if who.method.procedure:
         yield f"{who.method.procedure}."
     if static:
@@ -126,7 +126,7 @@ def _static_method(run: Run, recipe: dict[str, Any], lengths: str) -> str:
 
 
 def _of_earlier_calibrations(run: Run, serial: str) -> Iterator[str]:
-    """A sentence on the weight of earlier calibrations of the unit; nothing without a prior."""
+    """A sentence on the weight of earlier calibrations of the unit; none without a prior."""
     table = run.table("prior") if "prior" in run.tables() else None
     prior = None if table is None else prior_document(table[table["unit"] == serial], run.about)
     if prior is not None:

@@ -28,7 +28,7 @@ QUANTITIES = {
     "shock_bias_shift": "bias after the shocks minus before",
 }
 BUDGETS = ("reference_sensitivity", "transverse_sensitivity", "vibration_rectification", "shock_sensitivity")
-"""Results whose budget a certificate prints; of a transfer function that of its highest frequency as well."""
+"""Results whose budget a certificate prints; for a transfer function also the budget at its highest frequency."""
 AMPLITUDES = {"sweep": "g peak", "random_vibration": "g rms", "transverse": "g peak"}
 
 
@@ -150,7 +150,7 @@ def _response(
 
 
 def _curve(run: Run, unit: str, number: int, pairs: Sequence[tuple[Row, Row]]) -> content.Curve | None:
-    """The judged model through the points; None where the procedure has none."""
+    """The judged model of the points; None for a procedure without a model."""
     table = run.table("procedure_curves")
     rows = rows_of(table[(table["unit"] == unit) & (table["number"] == number) & (table["name"] != "")])
     if not rows:

@@ -48,7 +48,7 @@ OF_FEWER_AXES = {
     QUANTITIES["verification_norm"]: "error of the corrected output, verification (largest of the poses)",
     "error of |a|": "error",
 }
-"""Words for the norm of gravity, of a device that has no three axes to measure it."""
+"""Replacements for "norm of gravity" in texts on a device with fewer than three axes, which cannot measure it."""
 BUDGETS = ("bias", "scale", "output", "bias_error_period")
 """Quantities whose budget a certificate prints."""
 DECLARATION = (
@@ -166,14 +166,14 @@ def _quantity(row: Row) -> str:
 
 
 def _of_axes(text: str, letters: str) -> str:
-    """A text that speaks of the norm of gravity, for a device with these axes."""
+    """A text about the norm of gravity, adapted to a device with these axes."""
     for old, new in OF_FEWER_AXES.items() if len(letters) < len(AXES) else ():
         text = text.replace(old, new)
     return text
 
 
 def _result(row: Row, coefficients: list[content.Coefficient]) -> content.Result:
-    """A quantity of the budget; the scale, which the budget has relative to itself, as a sensitivity in units of the output."""
+    """A result from a quantity of the budget; the scale, relative in the budget, as a sensitivity in units of the output."""
     value, unit, expanded = row["value"], row["unit_text"], row["expanded"]
     scale = [c for c in coefficients if c.effect == row["quantity"] == "scale" and c.axis == row["axis"]]
     if scale:
@@ -240,7 +240,7 @@ def _grade_statement(budget: StatedBudget, grade: str) -> str:
 
 
 def _amendment(run: Run, calibration: Calibration, known: list[Calibration]) -> content.Amendment:
-    """What a certificate amends: one of the same measurement that it ended, or that was revoked before; and what ended it."""
+    """The amendment: the certificate of the same measurement that this one replaces, and the one that replaced this one."""
     event, last = calibration.event, calibration.ended_by
     earlier = [old for old in known if old.event.sequence < event.sequence and same_measurement(run, old.run)]
     ended = [old.certificate for old in earlier if old.event.sequence in event.ends]

@@ -1,4 +1,4 @@
-"""The content of a certificate as one document: paper and XML are written from it, and nothing is added there."""
+"""The content of a certificate as one document, from which PDF and XML are generated without additions."""
 
 from collections.abc import Sequence
 

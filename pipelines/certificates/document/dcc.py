@@ -16,7 +16,7 @@ SI_ADDRESS = "https://ptb.de/si/v2.0.0/SI_Format.xsd"
 
 
 class DocumentInvalid(TumblelineError):
-    """A certificate's XML that its schema does not allow: an error of this program, never of its user."""
+    """The generated XML is not valid against its schema: an error of this program, never of its user."""
 
 
 @cache
@@ -26,7 +26,7 @@ def schema() -> Any:
     folder = files("pipelines.certificates.document") / "schemas"
 
     class Local(etree.Resolver):
-        """Gives the copy that is shipped for the address in the import, and nothing for any other."""
+        """Returns the shipped copy for the address of the import, and refuses any other address."""
 
         def resolve(self, system_url: str, public_id: str, context: Any) -> Any:
             if system_url != SI_ADDRESS:

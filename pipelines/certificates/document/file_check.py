@@ -1,4 +1,4 @@
-"""A certificate's files checked alone, as who receives them does: form, schema, signatures, and the archive where it is given."""
+"""Checks of a certificate's files as a recipient makes them: form, schema, signatures, and the archive if one is given."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -35,8 +35,8 @@ class Check:
 class CheckedFile:
     """A file of a certificate with its checks.
 
-    facts : None where there is no certificate in it that could be read
-    proven_by : what shows where it comes from: ``signature`` of a trusted certificate, ``archive``; empty: nothing does
+    facts : statements of its certificate; None if there is none that can be read
+    proven_by : proofs of its origin: ``signature`` of a trusted certificate, ``archive``; empty if there is none
     """
 
     path: Path
@@ -59,9 +59,9 @@ class CheckedFile:
 class Against:
     """The references for a check of files.
 
-    trusted : certificates that vouch for signers; archive : None for the files alone
-    demanded : whether the archive must know the certificate: it was named for this check
-    laboratory : the laboratory's file, which proves with the archive what the archive cannot know
+    trusted : certificates that vouch for signers; archive : None to check the files alone
+    demanded : whether the archive must know the certificate, because it was named for this check
+    laboratory : the laboratory's file, to prove the texts that are not in the archive
     """
 
     trusted: Sequence[Certificate] = ()
@@ -71,7 +71,7 @@ class Against:
 
 
 def check_file(path: Path, against: Against) -> CheckedFile:
-    """A file of a certificate: PDF with attached XML, XML (with ``FILE.sig`` beside it, where there is one), or the signature.
+    """The checks of a certificate's file: PDF with attached XML, XML (with ``FILE.sig`` beside it, if present), or signature.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def _read(path: Path) -> bytes:
 
 
 def _document(data: bytes, done: CheckedFile, against: Against) -> Any | None:
-    """The root of the certificate's XML, signatures checked on the way; None where there is none to be read."""
+    """The root of the certificate's XML, after checks of its signatures; None if there is none that can be read."""
     path = done.path
     if path.suffix.lower() == ".pdf":
         return _pdf(data, done, against)
@@ -171,7 +171,7 @@ def _trust(done: CheckedFile, signers: Sequence[Signer], against: Against) -> No
             "signer", "not checked", "no trusted certificate is given: anybody can sign in this name; give --trust FILE"
         )
         return
-    # the laboratory signs first; who receives the file may add a signature of their own
+    # the laboratory signs first; a recipient of the file may add another signature
     why = not_trusted(signers[0], against.trusted)
     if why:
         done.add("signer", "bad", f"no certificate of --trust vouches for {signers[0].name}: {why}")

@@ -1,4 +1,4 @@
-"""Writing certificates: which ones are meant, and their files, all or none of a certificate; the PDF is typeset by typst."""
+"""Writing the files of chosen certificates, all or none of each; the PDF is typeset by typst."""
 
 import json
 from collections.abc import Sequence
@@ -82,7 +82,7 @@ def issue(
     key: SigningKey | None = None,
     address: str = "",
 ) -> Issued:
-    """Write the certificates that are meant into a folder.
+    """Write the chosen certificates into a folder.
 
     Parameters
     ----------
@@ -97,7 +97,9 @@ def issue(
     chosen, done = _chosen(archive, names)
     contents = [compose(Run(archive, calibration.run), calibration, known, who) for calibration, known in chosen]
     made: list[tuple[Calibration, dict[str, bytes]]] = []
-    for (calibration, _), content in zip(chosen, contents, strict=True):  # all are made before one is written
+    for (calibration, _), content in zip(
+        chosen, contents, strict=True
+    ):  # all contents exist before any file is written
         xml = dcc(content)
         document = pdf(content, xml, address.replace("{number}", content.number))
         parts = {"xml": xml, "pdf": document}
@@ -166,7 +168,7 @@ def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibrati
 
 
 def _reasons(run: Run) -> dict[str, str]:
-    """Why each unit of a run cannot be certified; empty for one that passed."""
+    """The reason why each unit of a run cannot be certified, by serial; empty for a unit that passed."""
     rows = rows_of(run.table("grades")) if "grades" in run.tables() else []
     return {
         str(row["unit"]): "" if row["outcome"] == "pass" else f"{row['outcome']}, no certificate: {row['reasons']}"
@@ -175,7 +177,7 @@ def _reasons(run: Run) -> dict[str, str]:
 
 
 def _why(archive: Archive, serial: str) -> str:
-    """Why a unit has no certificate, by the last run that graded it."""
+    """The reason why a unit has no certificate, from the last run that graded it."""
     for info in reversed([info for info in archive.runs() if serial in info.units]):
         run = Run(archive, info.id)
         reason = _reasons(run).get(serial)

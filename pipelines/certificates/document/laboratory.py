@@ -1,4 +1,4 @@
-"""The laboratory's file: who calibrates, for whom, who signs; what the archive cannot know and a certificate must say."""
+"""The laboratory's file: laboratory, customer, signatory and other statements of a certificate that the archive lacks."""
 
 import re
 from datetime import date as Day  # noqa: N812 - a field has its name
@@ -56,7 +56,7 @@ class Signatory(Strict):
 
 
 class Item(Strict):
-    """What the archive does not know of the calibrated units (7.8.2.1 g, h)."""
+    """Statements on the calibrated units that the archive lacks (7.8.2.1 g, h)."""
 
     manufacturer: Line
     description: Line = "Accelerometer"
@@ -66,7 +66,7 @@ class Item(Strict):
 
 
 class Method(Strict):
-    """The laboratory's own procedure, and what was done otherwise (7.8.2.1 f, n)."""
+    """The laboratory's procedure, and deviations from it (7.8.2.1 f, n)."""
 
     procedure: Annotated[str, Field(max_length=400)] = ""
     deviations: Text = ""

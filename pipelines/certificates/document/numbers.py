@@ -60,7 +60,7 @@ def _per(text: str, factor: float, below: str) -> SIUnit | None:
 
 
 def rounded(value: float, places: int) -> str:
-    """A number with so many decimal places; below zero places the digits that are not known are zeros."""
+    """A number with ``places`` decimal places; for negative ones the unknown digits are zeros."""
     text = f"{round(value, places):.{max(places, 0)}f}"
     return text.replace("-", MINUS) if float(text) != 0.0 else text.lstrip("-")
 
@@ -72,7 +72,7 @@ def with_uncertainty(value: float | None, expanded: float) -> tuple[str, str]:
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits, without an exponent where it has few zeros."""
+    """A number with given significant digits, without an exponent if it has few zeros."""
     if value == 0.0:
         return "0"
     if not math.isfinite(value):
@@ -84,11 +84,11 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 LEAST = 1e-4
-"""A smaller probability of false acceptance says more of the tail of a normal distribution than of the item."""
+"""Smallest probability of false acceptance that is stated: a smaller one depends on the assumed tail of the distribution."""
 
 
 def probability(value: float) -> str:
-    """A probability in percent; never below what is worth saying."""
+    """A probability in percent as text; "< 0.01 %" below :data:`LEAST`."""
     return "< 0.01 %" if value < LEAST else f"{100.0 * value:.2g} %"
 
 

@@ -27,7 +27,7 @@ DEEPEST = 20  # levels of the tree of attachments
 
 
 class SignatureBroken(DataRejected):
-    """A signature that does not hold, or a file that cannot be read as what it says it is."""
+    """An invalid signature, or a file that cannot be read in its stated format."""
 
 
 def parsed(data: bytes) -> Any:
@@ -50,7 +50,7 @@ def parsed(data: bytes) -> Any:
 
 
 def _refuse_slow(data: bytes, root: Any) -> None:
-    """Refuse what canonical form and schema take the square of its size for, and no certificate has."""
+    """Refuse XML on which canonical form or schema validation takes quadratic time, and which no certificate needs."""
     spaces = data.count(b"xmlns")
     if spaces > MOST_NAMES:
         raise SignatureBroken(f"it declares {spaces} namespaces, a certificate has at most {MOST_NAMES}")
@@ -66,7 +66,7 @@ def _refuse_slow(data: bytes, root: Any) -> None:
 
 
 def canonical(root: Any) -> bytes:
-    """An element in exclusive canonical form: equal for documents that say the same."""
+    """An element in exclusive canonical form, which is equal for equivalent documents."""
     etree = library("lxml.etree", "pdf", WHERE)
     try:
         return etree.tostring(root, method="c14n", exclusive=True)
@@ -100,7 +100,7 @@ def xml_signature(data: bytes) -> tuple[Signer, Any]:
     if not named:
         raise SignatureBroken("the signature names no certificate of its signer")
     pem = named[0].public_bytes(Encoding.PEM).decode()
-    # whether the certificate is valid today is decided with whom to trust, for XML and PDF alike
+    # the validity of the signer's certificate today is checked together with trust, for XML and PDF alike
     expected = signxml.SignatureConfiguration(
         location="./", require_x509=True, verification_time=named[0].not_valid_after_utc
     )
@@ -155,7 +155,7 @@ def _pdf_signer(embedded: Any) -> Signer:
     levels = library("pyhanko.sign.diff_analysis", EXTRA, WHERE).ModificationLevel
     context = library("pyhanko_certvalidator", EXTRA, WHERE).ValidationContext(
         trust_roots=[embedded.signer_cert], allow_fetching=False
-    )  # who is trusted is decided apart: here the signature is checked against its own certificate
+    )  # trust is checked elsewhere: here the signature is checked against its own certificate
     status = validation.validate_pdf_signature(embedded, context)
     name = embedded.field_name
     if not status.intact:
@@ -176,7 +176,7 @@ def _certificate(certificate: Any) -> Certificate:
 
 @contextmanager
 def _read_as(fault: str) -> Generator[None]:
-    """A block that reads a file of others, which may break any part of the reader: ``fault`` tells the cause."""
+    """A block that reads an untrusted file: any error of a reader becomes SignatureBroken with the text ``fault``."""
     try:
         yield
     except (SignatureBroken, MemoryError):  # the latter is of this machine: no verdict on the file
@@ -188,7 +188,7 @@ def _read_as(fault: str) -> Generator[None]:
 
 @dataclass(frozen=True)
 class CertificateFacts:
-    """Statements of a certificate's XML; empty where it does not make them.
+    """Statements of a certificate's XML; empty texts if it does not make them.
 
     coefficients : SHA-256 of the certified table
     """

@@ -1,4 +1,4 @@
-"""Who signed a certificate, and whether a certificate of the reader's own vouches for it."""
+"""The signers of a certificate, and whether a certificate trusted by the reader vouches for them."""
 
 import asyncio
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ EXTRA, WHERE = "signatures", "verify"
 
 @dataclass(frozen=True)
 class Signer:
-    """A signature that holds, and its signer.
+    """A valid signature, and its signer.
 
     certificate : the signer's own; chain : the other certificates beside the signature
     when : the time that the signer stated, UTC; None where the signature has none
@@ -56,7 +56,7 @@ def read_trusted(paths: Sequence[Path]) -> tuple[Certificate, ...]:
 
 
 def not_trusted(signer: Signer, trusted: Sequence[Certificate]) -> str:
-    """Why none of the trusted certificates vouches for a signer today; empty where one does.
+    """The reason why none of the trusted certificates vouches for a signer today; empty if one does.
 
     A certificate that is among the trusted ones vouches for itself, any other must lead to one of them. It has to be valid on the
     day of the check: whoever has the key of an expired one can state any time of signing.
@@ -68,7 +68,7 @@ def not_trusted(signer: Signer, trusted: Sequence[Certificate]) -> str:
 
 
 def not_valid(certificate: Certificate, now: datetime) -> str:
-    """Why a certificate is not valid at a time; empty where it is."""
+    """The reason why a certificate is not valid at a time; empty if it is."""
     first, last = certificate.not_valid_before_utc, certificate.not_valid_after_utc
     if first <= now <= last:
         return ""
@@ -83,7 +83,7 @@ def time_of(signer: Signer) -> str:
 
 
 def _path_problem(signer: Signer, trusted: Sequence[Certificate], moment: datetime) -> str:
-    """Why no path of certificates leads from a signer to a trusted one at a time; empty where one does."""
+    """The reason why no path of certificates leads from a signer to a trusted one at a time; empty if one does."""
     certvalidator = library("pyhanko_certvalidator", EXTRA, WHERE)
     asn1 = library("asn1crypto.x509", EXTRA, WHERE)
 

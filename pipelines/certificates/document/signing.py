@@ -1,4 +1,4 @@
-"""Signatures that others can check: PAdES in the PDF, a detached XML signature beside the XML; the key is the laboratory's."""
+"""Signatures with the laboratory's key that others can check: PAdES in the PDF, a detached XML signature beside the XML."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime

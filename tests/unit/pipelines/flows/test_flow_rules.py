@@ -91,4 +91,4 @@ def test_a_night_writes_page_and_document_and_a_discovery_is_an_alert(
     assert (alert["kind"], alert["subject"]) == ("discovery", "wafer")
     assert "third_order by wafer, rms 0.4 µg" in alert["text"]
     assert (other["kind"], other["subject"]) == ("discovery", "slot")
-    assert other["text"] == "discovery D2: unexplained by slot, no effect of the catalogue is like it"
+    assert other["text"] == "discovery D2: unexplained by slot, no effect of the catalogue explains it"
