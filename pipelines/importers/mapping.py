@@ -152,7 +152,9 @@ class Mapping(BaseModel):
     @field_validator("zone")
     @classmethod
     def _in_the_database(cls, value: str) -> str:
-        if value and value not in (known := available_timezones()):
+        if value and not (known := available_timezones()):
+            raise ValueError("this machine has no data base of time zones; install the package tzdata")
+        if value and value not in known:
             close = did_you_mean(
                 value, close_matches(value, known) or ("Europe/Berlin, and others of the IANA data base",)
             )

@@ -99,7 +99,9 @@ def recorded() -> int:
 def same(shown: str, printed: str) -> str:
     """How a text differs from that of the page, whatever names, numbers and processes are."""
     shown, printed = (re.sub(rf"{RECIPE}[- ][0-9a-f]{{8,}}", "RUN", text) for text in (shown, printed))
-    shown, printed = (re.sub(r"127\.0\.0\.1:\d+", "ADDRESS", text) for text in (shown, printed))  # its port may be taken
+    shown, printed = (
+        re.sub(r"127\.0\.0\.1:\d+", "ADDRESS", text) for text in (shown, printed)
+    )  # its port may be taken
     return pages.unlike(f"{shown} ", printed, 1.0)
 
 

@@ -21,7 +21,10 @@ from pipelines.cli import INTERRUPTED
 from schemas.errors import DONE, PART_FAILED, UNUSABLE
 
 ROOT = Path(__file__).resolve().parents[2]
-SERVE = ("workbench", "station monitor --port", "station serve", "station replay", "station watch", "--every")
+SERVE = (
+    *("workbench", "station monitor --port", "station serve", "station replay", "station watch", "--every"),
+    "demo --station",
+)
 """Examples that go on until Ctrl-C: they are started and ended in a process of their own."""
 
 WITH_A_DEVICE = ("station bring-up",)
@@ -150,7 +153,7 @@ def test_an_example_that_serves_ends_by_ctrl_c(example: str, world: tuple[Path, 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("example", [one for one in ALL if any(word in one for word in LONG)])
+@pytest.mark.parametrize("example", [one for one in ALL if any(word in one for word in LONG) and not kept(one)])
 def test_a_long_example_ends_with_a_result(example: str, tmp_path: Path, monkeypatch) -> None:
     _at_home(monkeypatch, tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -34,7 +34,7 @@ RECIPE = ROOT / "schemas" / "samples" / "production.toml"
         ("verification_repeats = 3", "verification_repeats = 9999999999", "'verification_repeats'"),
         ('name = "production"', f'name = "{"x" * 5000}"', "'name'"),
         ("seed = 1", f"seed = {'[' * 5000}", "nested too deeply"),
-        ("seed = 1", f"seed.{'a.' * 3000}b = 1", "deep in one another"),
+        ("seed = 1", f"seed.{'a.' * 3000}b = 1", "deep in one another|nested too deeply"),
         ("[[35.0, 15.0]", "[[1e200, 15.0]", "verification"),
     ],
     lambda row: row[1][:60],
