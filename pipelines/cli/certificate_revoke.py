@@ -40,5 +40,5 @@ def revoke(
     for other in valid:
         words = (serial, other.removeprefix(f"{serial}/"), "--reason", event.reason, *archive_words(archive))
         command = command_line("certificate", "revoke", *words)
-        lines.append(f"{other}, of the same measurements, stays valid; '{command}' revokes it")
+        lines += [f"{other}, of the same measurements, stays valid; this revokes it:", f"  {command}"]
     give({"unit": serial, "revoked": ended, "still_valid": valid, **event.document()}, lines, as_json=as_json)
