@@ -79,7 +79,7 @@ def test_the_wheel_holds_every_tracked_file_samples_and_lock_and_says_what_was_t
     (path,) = unpacked.glob("*.dist-info/METADATA")
     text = path.read_text(encoding="utf-8")
     versions = [line for line in text.splitlines() if "Programming Language :: Python :: 3." in line]
-    assert versions == [f"Classifier: Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)]
+    assert versions == [f"Classifier: Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13, 14)]
     assert "\nLicense-Expression: Apache-2.0\n" in text
 
 

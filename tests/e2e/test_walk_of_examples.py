@@ -146,7 +146,7 @@ def test_an_example_that_serves_ends_by_ctrl_c(example: str, world: tuple[Path, 
         if first.strip() or out.strip():  # else it had not begun yet: this machine has other work
             break
     assert first.strip() or out.strip(), err
-    assert process.returncode in {DONE, INTERRUPTED}, err
+    assert process.returncode in {DONE, INTERRUPTED, -signal.SIGINT}, err  # the last: it was about to end by itself
     assert "Traceback" not in err
     assert "defect" not in err
 

@@ -245,7 +245,13 @@ def test_a_name_that_no_run_has_and_a_place_without_an_archive_are_told(tmp_path
     store = Archive(tmp_path / "archive")
     for n in range(60):
         store.open_run("lot", {"lot": {"units": []}}, n)
-    refused("no run is called 'lates'; did you mean latest?", "show", "lates", "--archive", store.root)
+    refused(
+        "'lates' is no run, and no unit with a certificate; did you mean latest?",
+        "show",
+        "lates",
+        "--archive",
+        store.root,
+    )
     for name in ("zzzz", "lot"):
         _, _, message = given("show", name, "--archive", store.root)
         assert message.count("lot-") == 5, message
