@@ -152,7 +152,8 @@ class Mapping(BaseModel):
     @field_validator("zone")
     @classmethod
     def _in_the_database(cls, value: str) -> str:
-        if value and not (known := available_timezones()):
+        known = available_timezones() if value else set[str]()
+        if value and not known:
             raise ValueError("this machine has no data base of time zones; install the package tzdata")
         if value and value not in known:
             close = did_you_mean(
