@@ -46,8 +46,11 @@ OTHERWISE = {
     "tumbleline station program latest --station line-1.toml --format q24 --yes": "it belongs to another station or lot",
     # the example before it has revoked the only certificate
     "tumbleline certificate revoke SN1 2 --reason 'reference out of date'": "has no calibration that holds",
-    # the model of the folder is the one that the runs were fitted with
-    "tumbleline release model.toml --since 2026-01-01 --reason 'the error on fresh runs falls'": "says no better",
+    # the example of the what-if stands below it
+    "tumbleline release model.toml --since 2026-01-01 --reason 'the error on fresh runs falls'": "a what-if is needed",
+    # the recipe of the folder is measured to its end
+    "tumbleline plan order my.toml": "no table [stop]",
+    "tumbleline plan order my.toml --output my-first.toml": "no table [stop]",
     # the lot of the folder was measured at one temperature
     "tumbleline fit latest --limits industrial": "needs effect bias_temperature",
 }
