@@ -59,7 +59,7 @@ def made_in(folder: Path) -> dict[str, str]:
     shutil.copytree(folder / "archive", folder / "srv" / "archive")
     return {
         "/mnt/copies": str(folder / "copies"), "/mnt/copy": str(folder / "copy"), "/srv": str(folder / "srv"),
-        "RE-RUN": run_a, "RUN-A": run_a, "RUN-B": run_b,
+        "SN1_1.pdf": "SN1_3.pdf", "RE-RUN": run_a, "RUN-A": run_a, "RUN-B": run_b,
     }  # fmt: skip
 
 
