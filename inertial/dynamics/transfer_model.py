@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from inertial.arrays import Array, Complex, Flags
 from inertial.dynamics.missing_effects import p_value
@@ -19,6 +19,8 @@ POLISHED = 2  # of them that are carried to the end
 A_FEW, TO_THE_END = 12, 150  # steps
 PLAIN = Conditions(np.ones(2), np.ones(2), np.array([0.0, 1.0]), np.ones(2))
 """Points at which every effect has its parameters."""
+PORTION = 64  # models evaluated at once
+EPSILON = float(np.finfo(np.float64).eps)
 PREDICTION_STEP = 1e-6
 """Of a coordinate, for the central differences of a prediction: near the cube root of the machine's precision."""
 HELD_WITHIN = 1e-7
@@ -143,7 +145,10 @@ def factor(effects: Sequence[str], conditions: Conditions, values: Array) -> Com
 
 
 def factor_of(effects: Sequence[str], conditions: Conditions) -> Callable[[Array], Complex]:
-    """The product of the effects' factors (n,) at some points, as a function of the parameter values (p,) in order."""
+    """The product of the effects' factors at some points, as a function of the parameter values in order.
+
+    Values (p,) give the product (n,), values (p, k, 1) of k models at once (k, n).
+    """
     owned: list[tuple[TransferEffect, tuple[str, ...], slice]] = []
     at, count = 0, len(conditions.frequency)
     for name in effects:
@@ -156,7 +161,7 @@ def factor_of(effects: Sequence[str], conditions: Conditions) -> Callable[[Array
         for effect, _, part in owned:
             for parameter, ratio in effect.changes(conditions, values[part]).items():
                 changes[parameter] = changes.get(parameter, np.ones(1)) * ratio
-        out = np.ones(count, dtype=np.complex128)
+        out: Complex = np.ones(count, dtype=np.complex128)
         for effect, names, part in owned:
             changed = values[part]
             if changes and any(name in changes for name in names):
@@ -168,7 +173,7 @@ def factor_of(effects: Sequence[str], conditions: Conditions) -> Callable[[Array
 
 
 def _times(values: Array, ratios: Sequence[Array], count: int) -> Array:
-    """Values (p,) of parameters at each of ``count`` points, (p, count)."""
+    """Values (p, …, 1) of parameters at each of ``count`` points, (p, …, count)."""
     return np.stack([value * ratio * np.ones(count) for value, ratio in zip(values, ratios, strict=True)])
 
 
@@ -212,35 +217,39 @@ def fit_transfer(
     error = np.concatenate([points.magnitude_error, points.phase_error])
 
     def deviation(x: Array) -> Array:
-        values = coordinates.values(x[1:])
+        """Of the logarithm of the magnitude and of the phase, (…, 2n), for coordinates (…, p + 1)."""
+        values = coordinates.values(x[..., 1:])
         with np.errstate(all="ignore"):
-            ratio = points.value / (sign * np.exp(x[0]) * factor_at(values))
-            return np.nan_to_num(
-                np.concatenate([np.log(np.abs(ratio)), np.angle(ratio)]), nan=1e6, posinf=1e6, neginf=-1e6
-            )
+            ratio = points.value / (sign * np.exp(x[..., :1]) * factor_at(values.T[..., None]))
+            out = np.concatenate([np.log(np.abs(ratio)), np.angle(ratio)], axis=-1)
+        return np.nan_to_num(out, copy=False, nan=1e6, posinf=1e6, neginf=-1e6)
 
     def residual(x: Array) -> Array:
         return np.clip(deviation(x) / error, -1e6, 1e6)
 
+    def slopes(x: Array) -> Array:
+        steps = one_sided_steps(x, *bounds)
+        return np.asarray(((residual(x + np.diag(steps)) - residual(x)) / ((x + steps) - x)[:, None]).T)
+
+    def searched(start: Array, most: int) -> OptimizeResult:
+        return least_squares(residual, start, jac=slopes, bounds=bounds, max_nfev=most, x_scale="jac")
+
     level = float(np.log(np.median(np.abs(points.value[low_end]))))
 
-    def starts(*, alone: bool) -> list[Array]:
-        return [np.append(level, coordinates.of(start)) for start in _starts(parameters, near or {}, only_near=alone)]
+    def starts(*, alone: bool) -> Array:
+        return np.array(
+            [np.append(level, coordinates.of(start)) for start in _starts(parameters, near or {}, only_near=alone)]
+        )
+
+    def least(candidates: Array, remaining: Callable[[Array], Array]) -> list[Array]:
+        return list(candidates[np.argsort(_in_portions(remaining, candidates), kind="stable")[:SCREENED]])
 
     # far from the solution all points are off by many of their uncertainties: starts are compared by the deviation itself
-    screened = (
-        [] if only_near else sorted(starts(alone=False), key=lambda x: float(np.sum(deviation(x) ** 2)))[:SCREENED]
-    )
+    screened = [] if only_near else least(starts(alone=False), lambda x: np.sum(deviation(x) ** 2, axis=-1))
     # beside a known model by what a step leaves: a narrow mode is seen where its frequency is right, whatever its size
-    screened += sorted(starts(alone=True), key=lambda x: _after_a_step(residual, x))[:SCREENED] if near else []
-    tried = sorted(
-        (least_squares(residual, x, bounds=bounds, max_nfev=A_FEW, x_scale="jac") for x in screened),
-        key=lambda fit: fit.cost,
-    )
-    done = [
-        least_squares(residual, start.x, bounds=bounds, max_nfev=steps, x_scale="jac", xtol=1e-8, ftol=1e-8)
-        for start in tried[:POLISHED]
-    ]
+    screened += least(starts(alone=True), lambda x: _after_a_step(residual, x)) if near else []
+    tried = sorted((searched(start, A_FEW) for start in screened), key=lambda fit: fit.cost)
+    done = [searched(start.x, steps) for start in tried[:POLISHED]]
     best = min(done, key=lambda fit: fit.cost)
     jacobian = np.where(free, best.jac, 0.0)
     covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-15))
@@ -260,11 +269,32 @@ def fit_transfer(
     )
 
 
-def _after_a_step(residual: Callable[[Array], Array], start: Array) -> float:
-    """Sum of squares that a linear step from a start is expected to leave."""
-    left = residual(start)
-    jacobian = np.stack([(residual(start + h) - left) / h.max() for h in np.diag(np.full(len(start), 1e-5))], axis=1)
-    return float(np.sum((left - jacobian @ np.linalg.lstsq(jacobian, left, rcond=1e-10)[0]) ** 2))
+def one_sided_steps(x: Array, low: Array, high: Array) -> Array:
+    """Steps (p,) of a slope by differences at ``x`` (p,): away from zero, and within the bounds (p,)."""
+    steps = np.sqrt(EPSILON) * np.where(x >= 0.0, 1.0, -1.0) * np.maximum(1.0, np.abs(x))
+    outside = (x + steps < low) | (x + steps > high)
+    below, above = x - low, high - x
+    narrow = np.abs(steps) > np.maximum(below, above)
+    return np.where(narrow, np.where(above >= below, above, -below), np.where(outside, -steps, steps))
+
+
+def _in_portions(function: Callable[[Array], Array], x: Array) -> Array:
+    """A function of many coordinates (k, p), with as many at once as a processor keeps near."""
+    return np.concatenate([function(x[at : at + PORTION]) for at in range(0, len(x), PORTION)])
+
+
+def _after_a_step(residual: Callable[[Array], Array], starts: Array) -> Array:
+    """Sums of squares (k,) that a linear step from each of some starts (k, p) is expected to leave."""
+    size = starts.shape[-1]
+    left = residual(starts)
+    ahead = residual((starts[:, None] + np.diag(np.full(size, 1e-5))).reshape(-1, size)).reshape(len(starts), size, -1)
+    jacobians = np.swapaxes((ahead - left[:, None]) / 1e-5, 1, 2)
+    return np.array(
+        [
+            np.sum((to_explain - jacobian @ np.linalg.lstsq(jacobian, to_explain, rcond=1e-10)[0]) ** 2)
+            for jacobian, to_explain in zip(jacobians, left, strict=True)
+        ]
+    )
 
 
 def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:

@@ -99,10 +99,10 @@ class TransferEffect(DynamicEffect, ABC):
 
     @abstractmethod
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points, for parameter values (p,)."""
+        """The factor (n,) at the points for parameter values (p,); for values (p, k, 1) or (p, k, n) of k models (k, n)."""
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
-        """Factors (n,) of parameters of other effects at the points, by their names; none for most effects."""
+        """Factors, as of :meth:`factor`, of parameters of other effects at the points, by their names; none for most effects."""
         return {}
 
     def seen(self, points: Conditions) -> bool:

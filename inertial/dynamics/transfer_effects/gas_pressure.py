@@ -8,8 +8,8 @@ FREE_PATH_UM = 0.068  # of air at 25 °C and 1013 hPa
 LEAST_RATIO = 1.2  # of the largest pressure to the least
 
 
-def _slipping(pressure: Array, gap_um: float) -> Array:
-    """How much less viscous the film is than bulk gas, (n,): the more, the thinner the gap against the free path."""
+def _slipping(pressure: Array, gap_um: Array) -> Array:
+    """How much less viscous the film is than bulk gas, (n,) or (k, n) for k gaps: more for a thinner gap."""
     return np.asarray(1.0 + 9.638 * (FREE_PATH_UM * AMBIENT_HPA / pressure / gap_um) ** 1.159)
 
 
@@ -29,8 +29,7 @@ class GasPressure(TransferEffect):
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
         """Factor (n,) of the damping ratio at the pressure of each point."""
-        gap = float(values[0])
-        return {"damping": _slipping(np.array([AMBIENT_HPA]), gap) / _slipping(points.pressure, gap)}
+        return {"damping": _slipping(np.array([AMBIENT_HPA]), values[0]) / _slipping(points.pressure, values[0])}
 
     def seen(self, points: Conditions) -> bool:
         """Whether the pressure changed by a fifth or more."""

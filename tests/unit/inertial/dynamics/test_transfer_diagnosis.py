@@ -7,8 +7,8 @@ from scipy import signal
 
 from inertial.dynamics.spectra import transfer
 from inertial.dynamics.transfer_diagnosis import diagnose_transfer
-from inertial.dynamics.transfer_effects import Conditions
-from inertial.dynamics.transfer_model import Points, fit_transfer
+from inertial.dynamics.transfer_effects import EFFECTS, Conditions
+from inertial.dynamics.transfer_model import Points, factor_of, fit_transfer
 
 
 def points(f: np.ndarray, h: np.ndarray, share: float, phase: float, rng: np.random.Generator | None = None) -> Points:
@@ -34,6 +34,19 @@ def test_what_a_sweep_can_know(top: float, known: tuple, fitted: tuple) -> None:
         fit = fit_transfer(one, effects)
         assert fit.errors[0] == pytest.approx(expected[0], rel=0.06)
         assert fit.of("damping")[1] == pytest.approx(expected[1], rel=0.2, abs=2e-4)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_several_models_at_once_are_the_models_each_alone(effect: str, rng: np.random.Generator) -> None:
+    f = np.geomspace(5.0, 5000.0, 12)
+    c = Conditions(
+        f, np.linspace(1.0, 2.0, 12), np.linspace(10.0, 40.0, 12), np.ones(12), np.linspace(500.0, 1013.0, 12)
+    )
+    model = ("second_order", *({effect} - {"second_order"}))
+    parameters = [p for name in model for p in EFFECTS[name].parameters(c)]
+    values = np.array([[rng.choice(p.starts) for p in parameters] for _ in range(5)])
+    at_once = factor_of(model, c)(values.T[..., None])
+    np.testing.assert_array_equal(at_once, [factor_of(model, c)(row) for row in values])
 
 
 @pytest.mark.parametrize("kind", mostly_slow(["two_pole", "moving_average", "one_pole"], "one_pole"))
