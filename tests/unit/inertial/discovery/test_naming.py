@@ -16,7 +16,7 @@ NEEDED = 11.5
 @cache
 def maker() -> ArchiveMaker:
     """Archives of lots whose table rests 20 µrad off its targets."""
-    return ArchiveMaker(bank(WORLDS[1], 20, 77), WORLDS[1])
+    return ArchiveMaker(bank(WORLDS[1], 10, 77), WORLDS[1])
 
 
 def pool() -> Pool:
