@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from inspect import cleandoc
+from io import TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
 PIPE_CLOSED = 141  # the exit status that shells use for a reader that closed the pipe
+
+SURROGATES = "surrogates not allowed"  # the reason that Python gives where bytes of a name are no text
 
 COMPLETES = "_TUMBLELINE_COMPLETE"  # variable by which a shell asks for candidates; typer defines its name
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -236,6 +239,7 @@ def _product(
 def main() -> None:
     """Run the command line; an error that the user can correct is one message on standard error and an exit status."""
     _one_thread()
+    _text_for_every_encoding()
     report_to(lambda line: typer.echo(line, err=True))
     try:
         app()
@@ -271,6 +275,13 @@ def _unexpected(problem: Exception) -> None:
         _leave(
             f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one", UNUSABLE
         )
+    if isinstance(problem, UnicodeEncodeError) and problem.reason == SURROGATES:
+        around = problem.object[max(problem.start - 40, 0) : problem.end + 40]
+        _leave(
+            f"'{shown(around)}': the name of a file or folder is not in the encoding of this system "
+            f"({sys.getfilesystemencoding()}); rename it, or set LC_ALL to the encoding of its name",
+            UNUSABLE,
+        )
     from schemas.installed import not_installed
 
     missing = not_installed(problem)
@@ -288,6 +299,13 @@ def _one_thread() -> None:
     """
     for name in THREADS:
         os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
+
+
+def _text_for_every_encoding() -> None:
+    """Let the streams write '?' for characters that their encoding lacks, as that of a pipe on Windows lacks '√'."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _leave(message: str, status: int) -> None:

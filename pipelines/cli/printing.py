@@ -79,8 +79,12 @@ def warn(texts: Iterable[str]) -> None:
 
 
 def print_json(document: Any) -> None:
-    """One JSON document on standard output; numbers that JSON does not know become null."""
-    sys.stdout.write(json.dumps(json_value(document), ensure_ascii=False, indent=1, allow_nan=False) + "\n")
+    """One JSON document on standard output; numbers that JSON does not know become null.
+
+    Where the output is not UTF-8, as a pipe on Windows, characters beyond ASCII are written as JSON's escapes.
+    """
+    escaped = not (sys.stdout.encoding or "utf-8").lower().startswith("utf")  # a text in memory has none
+    sys.stdout.write(json.dumps(json_value(document), ensure_ascii=escaped, indent=1, allow_nan=False) + "\n")
     sys.stdout.flush()  # the readers of a running server wait for the document
 
 

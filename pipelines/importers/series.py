@@ -12,7 +12,9 @@ import pandas as pd
 from inertial.arrays import Array
 from pipelines.archive import Run
 from pipelines.importers import clocks, files, guesses
+from pipelines.importers.content import Content
 from pipelines.importers.mapping import TIME_UNITS
+from pipelines.importers.stated_units import output_unit
 from pipelines.importers.values import finite_column
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
@@ -51,9 +53,10 @@ def series_of_file(
 
     Parameters
     ----------
-    columns : names, or numbers from 1 for a text file without a header; all columns of numbers but the time where none is given
+    columns : names, or numbers from 1 for a text file without a header; where none is given all columns of numbers but the time,
+        and only those that state a unit of an output where some do
     time : column of the time, in ``time_unit``; rate_hz : Hz; without both the columns are recognised, with their units
-    unit : of the output, for printed results
+    unit : of the output, for printed results; that which the columns state if it is not given
 
     Raises
     ------
@@ -64,37 +67,42 @@ def series_of_file(
     """
     if time and rate_hz is not None:
         raise WrongUse(f"{path.name}: one of --map time=COLUMN and --rate HZ is needed; give one of the two")
-    recognised = ""
-    if not time and rate_hz is None:
-        time, found, columns, known_unit = _recognised(path, columns)
-        time_unit, unit = time_unit or found, unit or known_unit
-        listed = ", ".join(shown(name) for name in columns) or "all other columns"
-        recognised = (
-            f"recognised: time '{shown(time)}' in {time_unit}, {listed} in {unit or 'an unknown unit'}; else --map"
-        )
-    time_unit = time_unit or "s"
+    content, _ = files.read_content(path)
+    table, found, known_unit = content.table, "", ""
+    if taken := not time and rate_hz is None:
+        time, found, columns, known_unit = _recognised(content, path, columns)
+    time_unit = time_unit or found or "s"
     if time_unit not in TIME_UNITS:
         raise WrongUse(
             f"--unit-of: time: found '{shown(time_unit)}', one of {', '.join(TIME_UNITS)} is needed; correct it"
         )
-    table, _ = files.read(path)
     chosen = list(columns) or [n for n in table.columns if n != time and pd.api.types.is_numeric_dtype(table[n])]
     if not chosen:
         raise DataRejected(f"{path.name}: no column of numbers, one at least is needed; name one with --map")
+    recognised = ""
     if rate_hz is not None and not columns:
         even = [name for name in chosen if _is_clock(finite_column(table, name, path.name))]
         if even and len(even) < len(chosen):
             chosen = [name for name in chosen if name not in even]
             recognised = f"{', '.join(map(shown, even))} rises evenly and is no output"
+    stated = {name: output_unit(content.units.get(name, "")) for name in chosen}
+    if not columns and any(stated.values()):
+        chosen = [name for name in chosen if stated[name]]
+    of_chosen = {stated[name] for name in chosen if name in stated}
+    unit = unit or known_unit or (of_chosen.pop() if len(of_chosen) == 1 else "")
+    if taken:
+        listed = ", ".join(map(shown, chosen))
+        recognised = (
+            f"recognised: time '{shown(time)}' in {time_unit}, {listed} in {unit or 'an unknown unit'}; else --map"
+        )
     values = np.stack([finite_column(table, name, path.name) for name in chosen])
     _refuse_clock(chosen, values, path.name, named=bool(columns), timed=bool(time))
     rate = rate_hz or _rate(_seconds(table, time, time_unit, path.name), path.name)
     return EvenSeries(tuple(chosen), values, float(rate), unit, path.name, recognised)
 
 
-def _recognised(path: Path, columns: Sequence[str]) -> tuple[str, str, Sequence[str], str]:
+def _recognised(content: Content, path: Path, columns: Sequence[str]) -> tuple[str, str, Sequence[str], str]:
     """Column of the time and its unit, those of the outputs where none are named, and their unit, as an import takes them."""
-    content, _ = files.read_content(path)
     known = guesses.guesses(content)
     time = known.column("time")
     if not time:

@@ -145,6 +145,21 @@ def test_dates_are_a_time(record: Path, tmp_path: Path) -> None:
     assert document["terms"] == document_of("noise", "allan", record, *OF_G)["terms"]
 
 
+@pytest.mark.parametrize(
+    ("given", "unit"),
+    [(("--rate", "100"), "V"), ((), "V"), (("--unit-of", "output=g"), "g"), (("--map", "time=t,x=T [°C]"), "")],
+)
+def test_one_axis_has_the_unit_of_its_heading_and_a_temperature_is_no_output(
+    given: tuple[str, ...], unit: str, record: Path, tmp_path: Path
+) -> None:
+    table = pd.read_csv(record)[["t", "ax"]].rename(columns={"ax": "output [V]"})
+    table["T [°C]"] = 25.0 + np.random.default_rng(4).normal(size=len(table))
+    table.to_csv(tmp_path / "one.csv", index=False)
+    document = document_of("noise", "psd", tmp_path / "one.csv", *given)
+    assert document["unit"] == unit
+    assert {row["channel"] for row in document["curves"]} == {"output [V]" if unit else "T [°C]"}
+
+
 def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     x = 1e-3 * fractional(rng, 1, 60_000)[0] + 1e-4 * rng.standard_normal(60_000)
