@@ -157,7 +157,7 @@ def test_one_axis_has_the_unit_of_its_heading_and_a_temperature_is_no_output(
     table.to_csv(tmp_path / "one.csv", index=False)
     document = document_of("noise", "psd", tmp_path / "one.csv", *given)
     assert document["unit"] == unit
-    assert {row["channel"] for row in document["curves"]} == {"output [V]" if unit else "T [°C]"}
+    assert {row["channel"] for row in document["spectra"]} == {"output [V]" if unit else "T [°C]"}
 
 
 def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
