@@ -101,9 +101,11 @@ def guesses(content: Content) -> Guesses:
     rows = Guesses(guessed, Guess("", ""), Guess("", ""), sheet or positions, found)
     if rows.dwells:
         _of_dwells(numeric, guessed, inside)
-    output = _output(content, numeric, guessed, found.sphere, means=rows.dwells)
     time_unit = _time_unit(content, numeric, guessed, dwells=rows.dwells)
-    return replace(rows, time_unit=time_unit, output=output, few=_few_axes(content, numeric, guessed))
+    few = _few_axes(content, numeric, guessed)
+    names = [column for axis in "xyz" if (column := few.get(axis) or _column(guessed, axis))]
+    output = _output(content, numeric, names, found.sphere, means=rows.dwells)
+    return replace(rows, time_unit=time_unit, output=output, few=few)
 
 
 def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> Flags:
@@ -311,18 +313,20 @@ def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, G
 def _output(
     content: Content,
     numeric: dict[str, Array],
-    guessed: dict[str, Guess],
+    names: list[str],
     sphere: triads.Sphere | None,
     *,
     means: bool,
 ) -> Guess:
-    """The unit of the output; a unit that the numbers do not settle is a guess with a doubt, which the user has to confirm."""
-    names = [name for axis in "xyz" for name, guess in guessed.items() if guess.meaning == axis]
-    if len(names) != 3:
-        return Guess("", "")
+    """The unit of the outputs ``names``: that which they state, or that which the numbers of three axes show.
+
+    A unit that the numbers do not settle is a guess with a doubt, which the user has to confirm.
+    """
     stated = {output_unit(content.units.get(name, "")) for name in names}
     if len(stated) == 1 and "" not in stated:
         return Guess(stated.pop(), "the file states it")
+    if len(names) != 3:
+        return Guess("", "")
     output = np.column_stack([numeric[name] for name in names])
     output = output[np.isfinite(output).all(axis=1)]
     if not len(output):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from collections.abc import Mapping as Columns
 from typing import Any
 
@@ -42,9 +43,10 @@ def column_name(columns: list[str], name_or_number: str) -> str:
 def completed(given: dict[str, Any], content: Content) -> dict[str, Any]:
     """The content of a mapping with the unit of the output that the file states, if none is given."""
     units, columns = dict(given.get("units", {})), given.get("columns", {})
-    if "output" in units or not all(axis in columns for axis in "xyz"):
+    axes = given.get("axes", "xyz")
+    if "output" in units or not all(axis in columns for axis in axes):
         return given
-    stated = _of_axes(columns, content)
+    stated = _of_axes(columns, content, axes)
     return given if len(stated) != 1 or "" in stated else given | {"units": {"output": stated.pop(), **units}}
 
 
@@ -79,6 +81,6 @@ def _refuse_other_spreads(mapping: Mapping, content: Content, where: str) -> Non
             )
 
 
-def _of_axes(columns: Columns[str, str], content: Content) -> set[str]:
+def _of_axes(columns: Columns[str, str], content: Content, axes: Iterable[str] = "xyz") -> set[str]:
     names = list(content.table.columns)
-    return {output_unit(content.units.get(column_name(names, columns.get(axis, "")), "")) for axis in "xyz"}
+    return {output_unit(content.units.get(column_name(names, columns.get(axis, "")), "")) for axis in axes}

@@ -7,7 +7,7 @@ fitted in :attr:`LotTables.parts`, or, for values that all units share, as :attr
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -259,9 +259,15 @@ def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool 
     ----------
     square : whether the model takes the axes as square, so that six parameters, not nine, give the directions
     like : the run whose nominal scale and response are used: coefficients of one run apply to another only so
+
+    Raises
+    ------
+    DataRejected
+        Only the norm of gravity is known, of a device with fewer than three axes.
     """
     readings = measurement.readings
     if measurement.reference == "norm":
+        _refuse_few_axes(readings.axes)
         return lot_of_norms(readings, measurement.state, (like or measurement).readings, square=square)
     coefficients = (like or measurement).readings.fits
     axes = readings.axes
@@ -275,6 +281,16 @@ def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool 
     state = replace(measurement.state, felt=felt, output_run=run, memory={})
     recorded = readings.spread is not None and readings.count is not None
     return Lot(state, np.where(there[..., None], output, 0.0), error, response, recorded=recorded, scale=scale)
+
+
+def _refuse_few_axes(axes: Sequence[int]) -> None:
+    """Refuse a device of one axis or two whose poses are unknown."""
+    if len(axes) < 3:
+        given = ", ".join("xyz"[axis] for axis in axes)
+        raise DataRejected(
+            f"dwells of axis {given} alone without an angle or a force: the magnitude of gravity shows itself to three axes only, "
+            "a reference is needed; import the file again with the column of its angle or force (--map tilt=… or force_x=…)"
+        )
 
 
 def _columns(force: Array) -> int:
