@@ -173,9 +173,9 @@ def _open(guessed: Guesses, output: Array | None) -> list[str]:
         if guessed.few:
             found = " and ".join(f"{axis}: {column}" for axis, column in guessed.few.items())
             open_.append(
-                f"{found} taken for a device of fewer than three axes, which an import takes by --set axes=…; 'tumbleline fit RUN' "
-                "fits it where its angle or force is beside it (--map tilt=… or force_x=…), and a record at rest has its noise by "
-                "'tumbleline noise allan' and 'tumbleline noise psd'"
+                f"{found} taken for a device of fewer than three axes, which an import takes by --set axes=…; 'tumbleline fit "
+                "RUN' fits it where its angle or force is beside it (--map tilt=… or force_x=…), and a record at rest has its "
+                "noise by 'tumbleline noise allan' and 'tumbleline noise psd'"
             )
             return open_ if guessed.output.meaning else [*open_, _OUTPUT_UNIT]
         missing = [axis for axis in "xyz" if not guessed.column(axis)]

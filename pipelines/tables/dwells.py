@@ -288,7 +288,7 @@ def _refuse_few_axes(axes: Sequence[int]) -> None:
     if len(axes) < 3:
         given = ", ".join("xyz"[axis] for axis in axes)
         raise DataRejected(
-            f"dwells of axis {given} alone without an angle or a force: the magnitude of gravity shows itself to three axes only, "
+            f"dwells of axis {given} alone without an angle or a force: the magnitude of gravity is seen by three axes only, "
             "a reference is needed; import the file again with the column of its angle or force (--map tilt=… or force_x=…)"
         )
 
