@@ -170,7 +170,7 @@ class Run:
         if self.about.get("lot") and not self.about.get("capture") and not path.is_file():
             raise ArchiveUnusable(
                 f"archive: run {self.id} was imported and has no table '{name}', which a fit of its dwells makes; fit it with "
-                f"'tumbleline rerun {self.id} --effects a,b,c' and name that run"
+                f"'tumbleline fit {self.id}' and name that run"
             )
         return read_table(path, name, self.manifest(name)["sha256"] if path.is_file() else None, columns)
 

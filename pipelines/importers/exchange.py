@@ -114,10 +114,7 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
         if column in KNOWN_COLUMNS or pd.api.types.is_numeric_dtype(frame[column]):
             frame[column] = _numbers(frame, column, where)
     frame["dwell"] = _dwell_numbers(frame, where)
-    if len(output_axes(frame.columns)) < len(OUTPUT_COLUMNS):
-        _known_along(frame)
-    _all_or_none(frame, FORCE_COLUMNS, where)
-    _all_or_none(frame, ANGLE_COLUMNS, where)
+    complete_references(frame, where)
     for names in (SPREAD_COLUMNS, SLOW_COLUMNS):
         _all_or_none(frame, tuple(names[axis] for axis in output_axes(frame.columns)), where)
     _plausible(frame, where)
@@ -136,12 +133,18 @@ def _refuse_half_an_axis(frame: pd.DataFrame, where: str) -> None:
             _require(frame, (name,), where)
 
 
-def _known_along(frame: pd.DataFrame) -> None:
-    """A reference that states the force along each axis of a device with one or two: across them it states none."""
-    if all(FORCE_COLUMNS[axis] in frame.columns for axis in output_axes(frame.columns)):
+def complete_references(frame: pd.DataFrame, where: str) -> None:
+    """Add the forces across the axes of a device with one or two, 0 g, where those along them are stated.
+
+    Raises DataRejected: some components of the force, or one of two angles, are missing.
+    """
+    axes = output_axes(frame.columns)
+    if len(axes) < len(OUTPUT_COLUMNS) and all(FORCE_COLUMNS[axis] in frame.columns for axis in axes):
         for name in FORCE_COLUMNS:
             if name not in frame.columns:
                 frame[name] = 0.0
+    _all_or_none(frame, FORCE_COLUMNS, where)
+    _all_or_none(frame, ANGLE_COLUMNS, where)
 
 
 def _run(source: str | Path, archive: str | Path | None) -> Run:

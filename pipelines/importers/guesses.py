@@ -237,11 +237,15 @@ def _axes(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]
 
 
 def _few_axes(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]) -> dict[str, str]:
-    """The columns of a device with one axis or two: all that is left of a record in time; the axis by its name, else in order."""
+    """The columns of a device with one axis or two: all that is left of a record in time; the axis by its name, else in order.
+
+    Where some of them state a unit of an output, the others are none.
+    """
     if not _column(guessed, "time") or any(_column(guessed, axis) for axis in "xyz"):
         return {}
     left = [name for name, numbers in numeric.items() if not guessed[name].meaning and not _is_index(numbers)]
     left = [name for name in left if triads.may_be_output(name, content.units.get(name, ""))]
+    left = [name for name in left if output_unit(content.units.get(name, ""))] or left
     named = [found[1].lower() if (found := _LETTER.search(name)) else "" for name in left]
     letters = named if all(named) and len(set(named)) == len(named) else list("xyz"[: len(left)])
     return dict(sorted(zip(letters, left, strict=True))) if len(left) in (1, 2) else {}

@@ -41,7 +41,7 @@ def imported_dwells(data: Imported) -> pd.DataFrame:
     if units > 1:
         raise WrongUse(
             f"import: {units} units, a fit at import takes one; import them one by one, or without --fit and then "
-            "'tumbleline rerun RUN --effects a,b,c'"
+            "'tumbleline fit RUN'"
         )
     if not set(OUTPUT_COLUMNS) <= set(data.dwells.columns):
         raise WrongUse(

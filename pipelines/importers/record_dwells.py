@@ -12,6 +12,7 @@ from inertial import frames
 from inertial.arrays import Array, Index
 from inertial.estimation.slow_noise import FEWEST_SAMPLES, slow_deviation
 from inertial.quantities import ANGLE_COLUMNS, BY_COLUMN, FORCE_COLUMNS
+from pipelines.importers.exchange import complete_references
 from pipelines.importers.mapping import FACES, OUTPUT_UNITS, TILT, Mapping
 from pipelines.importers.stretches import Stretches
 from pipelines.importers.values import BOUNDS
@@ -95,6 +96,7 @@ def finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     if TILT in frame.columns:
         return _tilted(frame, mapping)
     if not (mapping.poses or mapping.face):
+        complete_references(frame, "import")
         return turned(frame, _gravity(mapping))
     if mapping.norm_g is None:
         raise WrongUse(
