@@ -3,7 +3,6 @@
 import json
 import re
 from collections import Counter
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from root_process import ROOT
 from typed_commands import printed_commands
 
 from inertial.frames import force_from_angles
-from inertial.noise.dwells import DwellNoise
 from pipelines.archive import Archive
 from pipelines.chain.runner import Runner
 from pipelines.cli.next_commands import fit_refusal
@@ -27,10 +25,7 @@ from pipelines.jobs.model_change import change_from_options
 from pipelines.jobs.recipe_text import limits_from
 from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.releases import release
-from pipelines.planning.context import plan_context
-from pipelines.planning.lower_bound import lower_bound
-from pipelines.planning.requirement import Requirement, apart, candidates, orders, soak_seconds
-from pipelines.planning.textbook import reference_errors, textbook
+from pipelines.planning.requirement import Requirement, apart, orders, soak_seconds
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.recipe import Recipe
@@ -387,23 +382,6 @@ def test_effects_that_may_be_mistaken_are_told_apart_by_the_cheapest_recipe(tmp_
     poses = [(p.outer_deg, p.inner_deg) for k in range(len(recipe.soaks)) for p in recipe.poses_at(k)]
     size = np.abs(force_from_angles(*np.radians(poses).T))
     assert np.mean((size > 0.1) & (size < 0.6), axis=0).min() > 0.3  # where the two curves are apart
-
-
-@pytest.mark.slow  # a search and its bound: tests/e2e/test_ramps.py
-def test_no_recipe_is_quicker_than_the_bound_of_dwells_without_end() -> None:
-    base = load_recipe().model_copy(update={"effects": THERMAL.split(","), "static_record_s": 0.0})
-    shares: dict[float, float] = {}
-    for bias in (30.0, 150.0):
-        against = plan_context(textbook(base, (-10.0, 60.0)), load_station(), DwellNoise(1e-7, bias * 1e-6))
-        requirement = Requirement(
-            reference_errors(against, base), (), (-10.0, 60.0), candidates(against.station), optional_levels=(25.0,)
-        )
-        shares[bias] = lower_bound(base, against, requirement).share
-    # the errors wanted grow with the flicker: the same part of the time
-    assert shares[30.0] == pytest.approx(shares[150.0], abs=0.011)
-    assert 0.7 < shares[30.0] < 0.95
-    half = replace(requirement, errors=2.0 * requirement.errors)
-    assert lower_bound(base, against, half).share < 0.5
 
 
 @pytest.mark.slow

@@ -18,9 +18,9 @@ from long_suites import mostly_slow
 from pipelines.jobs.recipes import load_recipe
 
 SCRIPT = "<img src=x onerror=window.ran=1>"
-PAGES = (
-    "/units", "/run?run=latest", "/unit?run=latest", "/missing", "/upload", "/operator", "/models", "/plan", "/station", "/audit",
-)  # fmt: skip
+FEW = ("/units", "/run?run=latest", "/unit?run=latest", "/upload", "/station")
+PAGES = (*FEW, "/missing", "/operator", "/models", "/plan", "/audit")
+"""Those that compute for long, which are of the slow suite, are made of the same parts."""
 
 
 LOOKS: dict[str, dict[str, Any]] = {"screen": {}, "dark tablet": {"dark": True, "size": (820, 1180)}}
@@ -44,12 +44,15 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("look", mostly_slow(LOOKS, "screen"))
+@pytest.mark.parametrize(
+    ("look", "paths"), mostly_slow([("screen", FEW), *((look, PAGES) for look in LOOKS)], ("screen", FEW)),
+    ids=["few", *LOOKS],
+)  # fmt: skip
 def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybody(
-    bench: Served, browser: Any, look: str
+    bench: Served, browser: Any, look: str, paths: tuple[str, ...]
 ) -> None:
     with tab(browser, bench.address, **LOOKS[look]) as one:
-        for path in PAGES:
+        for path in paths:
             one.open(path)
             assert one.findings() == [], path
             assert one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth") <= 0, path
