@@ -19,13 +19,13 @@ name = "{name}"
 device = "sf1500"
 units = ["SF-01", "SF-02"]
 local_gravity_m_s2 = 9.80665
-poses = "eighteen"
+poses = "twelve"
 verification = [[35.0, 15.0], [105.0, -100.0]]
 temperatures_C = [0.0, 50.0]
 settle_s = 1.0
 dwell_s = 2.0
 rate_hz = 50.0
-static_record_s = 30.0
+static_record_s = 60.0
 effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 limits = "own.limits.toml"
 """
@@ -219,12 +219,12 @@ def test_what_one_axis_hides_is_named(kind: str, figures: str, effect: str, tmp_
     [
         ('device = "sf1500"', 'device = "adxl355"', "sensor_axes: 1 of device ADXL355, its digital output sends 3"),
         (
-            "static_record_s = 30.0",
+            "static_record_s = 60.0",
             'procedures = [{ kind = "multi_position" }, { kind = "transverse" }]',
             "it measures axis y, z, the device has x",
         ),
         (
-            "static_record_s = 30.0",
+            "static_record_s = 60.0",
             'procedures = [{ kind = "multi_position" }, { kind = "sweep", axis = "z" }]',
             "it measures axis z, the device has x",
         ),
