@@ -90,7 +90,7 @@ def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have
 ) -> None:
     peer, factor, unit = STATISTICS[statistic]
     words = ("noise", "allan", record, *OF_G, "--statistic", statistic, "--map", "ax")
-    found = document_of(*words, "--output", tmp_path / "a.png", "--output", tmp_path / "a.html")
+    found = document_of(*words, "--output", tmp_path / "a.html")
     assert (found["statistic"], found["deviation_unit"]) == (statistic, unit)
     (curve,) = found["curves"]
     values = pd.read_csv(record)["ax"].to_numpy()

@@ -141,16 +141,16 @@ def test_wander_of_the_device_counts_beside_its_white_noise(faces: Path) -> None
 
 
 REFUSED_BY_RUN = {
-    'units = ["A1"]\n[stop]\nvisible = ["thermal_histeresis"]\n': "stop.visible: unknown effect 'thermal_histeresis'",
     "[stop]\nbias_ug = 1.0\n": "[stop] asks for U = 1 µg of bias, the references alone have U = ",
     'limits = "consumr"\n': "no file and no built-in limits are called 'consumr'",
     'seed = 1\nlimits = "consumer"\n': "verification_norm_ug, verification_ratio, bias_error_ug need verification poses",
-    "sensor_axes = 1\n": "sensor_axes: 1 of device ADXL355, its digital output sends 3",
     "static_record_s = 60.0\nstatic_temperature_C = 300.0\n": "key 'static_temperature_C': 300 °C, the chamber",
 }
 
 
-@each(REFUSED_BY_RUN)
+@each(
+    REFUSED_BY_RUN
+)  # of a device with one axis: tests/e2e/test_one_axis.py; of [stop]: tests/e2e/test_run_that_ends.py
 def test_what_run_refuses_is_told_by_plan_with_its_exit_status(row: str, faces: Path) -> None:
     faces.write_text((RECIPE.replace(OWN, "") if "limits" in row else RECIPE) + row, encoding="utf-8")
     status, _, told = given("plan", faces, "--noise", "25,0")
