@@ -153,7 +153,10 @@ import sys
 for name in ("fcntl", "termios", "resource", "prefect"):
     sys.modules[name] = None
 from pathlib import Path
+from types import SimpleNamespace
 import tumbleline as tl
+from pipelines.diagnosis import diagnose
+diagnose.proposed = lambda _: SimpleNamespace(rows=list)  # which is most of the time
 run = tl.read(Path("dwells.csv"), archive="archive")
 fit = tl.fit(run)
 diagnosis = tl.diagnose(run, fit)

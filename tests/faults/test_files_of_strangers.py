@@ -116,7 +116,6 @@ def test_a_reader_has_the_memory_of_its_limit_and_no_more() -> None:
     assert in_tests(takes_memory, 100) == 100 * MIB
     with pytest.raises(DataRejected, match=r"takes more than 256 MB of memory"):
         in_tests(takes_memory, 300)
-    assert in_tests(takes_memory, 100) == 100 * MIB
 
 
 def test_a_defect_of_a_reader_keeps_its_kind_and_place_and_one_process_reads_one_file_at_a_time() -> None:

@@ -224,7 +224,7 @@ def test_the_command_leaves_with_status_1_where_something_is_wrong(copy: Path) -
 
 @pytest.fixture(scope="module")
 def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An archive whose capture has an event in its journal."""
+    """An archive of another lot, whose capture has an event in its journal."""
     folder = tmp_path_factory.mktemp("interrupted")
 
     def noting(job, records, progress) -> None:
@@ -233,7 +233,8 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(VARIABLE, "")
-        list(Runner(small_job(folder, *BRIEF), Archive(folder / "archive"), measure=noting).all())
+        job = small_job(folder, *BRIEF, ("seed = 5", "seed = 6"))
+        list(Runner(job, Archive(folder / "archive"), measure=noting).all())
     return folder / "archive"
 
 
@@ -270,10 +271,11 @@ def test_a_link_of_the_chain_that_was_taken_off_its_end_is_missed_unless_its_wri
     assert ("missing", "chain/000000/000000001.json") in {(f.kind, f.path) for f in verified(copy).checked.findings}
 
 
-def test_a_run_that_was_copied_here_is_named_with_its_seal_and_without(copy: Path, tmp_path: Path, monkeypatch) -> None:
+def test_a_run_that_was_copied_here_is_named_with_its_seal_and_without(
+    copy: Path, interrupted: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(seals, "JUST_NOW", timedelta(0))
-    (tmp_path / "b").mkdir()
-    other = finished_run(tmp_path / "b", *BRIEF, ("seed = 5", "seed = 6"))
+    other = run_of(interrupted)
     shutil.copytree(other.path, copy / "runs" / other.id)
     shutil.copytree(other.records.path, copy / "captures" / other.records.path.name)
     assert found(copy) == [("edited", "sealed.json")]
