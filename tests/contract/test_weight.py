@@ -71,7 +71,8 @@ def imports(path: Path) -> dict[str, set[str]]:
             return
         inner = "inside" if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and where == "top" else where
         for one in ast.iter_child_nodes(node):
-            walk(one, inner)
+            if isinstance(one, ast.stmt | ast.excepthandler | ast.match_case):  # no expression holds an import
+                walk(one, inner)
 
     walk(ast.parse(path.read_text(encoding="utf-8")), "top")
     return found

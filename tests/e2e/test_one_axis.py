@@ -17,7 +17,7 @@ DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 RECIPE = """
 name = "{name}"
 device = "sf1500"
-units = ["SF-01", "SF-02"]
+units = ["SF-01", "SF-02", "SF-03"]
 local_gravity_m_s2 = 9.80665
 poses = "eighteen"
 verification = [[35.0, 15.0], [105.0, -100.0]]
@@ -25,7 +25,7 @@ temperatures_C = [0.0, 50.0]
 settle_s = 1.0
 dwell_s = 2.0
 rate_hz = 50.0
-static_record_s = 60.0
+static_record_s = 30.0
 effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 limits = "own.limits.toml"
 """
@@ -131,10 +131,10 @@ def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) ->
     words = ("export", runs["one"], "--archive", folder / "archive", "--format", "teds", "--set", f"teds={teds}")
     text_of(*words, "--output", tmp_path)
     assert sorted(file.name for file in tmp_path.iterdir()) == sorted(
-        f"SF-0{unit}{ending}" for unit in (1, 2) for ending in ("-x.teds", ".txt")
+        f"SF-0{unit}{ending}" for unit in (1, 2, 3) for ending in ("-x.teds", ".txt")
     )
     rows = table(measured, "coefficients", "one").set_index(["unit", "effect"])
-    for number in (1, 2):
+    for number in (1, 2, 3):
         image = (tmp_path / f"SF-0{number}-x.teds").read_bytes()
         assert len(image) == 32
         assert sum(image) % 256 == 0
@@ -219,12 +219,12 @@ def test_what_one_axis_hides_is_named(kind: str, figures: str, effect: str, tmp_
     [
         ('device = "sf1500"', 'device = "adxl355"', "sensor_axes: 1 of device ADXL355, its digital output sends 3"),
         (
-            "static_record_s = 60.0",
+            "static_record_s = 30.0",
             'procedures = [{ kind = "multi_position" }, { kind = "transverse" }]',
             "it measures axis y, z, the device has x",
         ),
         (
-            "static_record_s = 60.0",
+            "static_record_s = 30.0",
             'procedures = [{ kind = "multi_position" }, { kind = "sweep", axis = "z" }]',
             "it measures axis z, the device has x",
         ),
@@ -295,7 +295,7 @@ def test_teds_of_every_axis_are_in_the_memory_of_the_device_and_stay_there(
     exported = given("export", runs[which], *words, "--output", tmp_path / "files")
     assert exported[0] == 0, exported
     done = document_of("station", "program", runs[which], *words, "--yes")
-    assert [one["outcome"] for one in done["teds"]] == ["proved"] * 2
+    assert [one["outcome"] for one in done["teds"]] == ["proved"] * 3
     for one in done["teds"]:
         assert [page["axis"] for page in one["pages"]] == list(letters)
         assert not any(bytes.fromhex(one["before"]))
