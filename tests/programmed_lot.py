@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from capture_double import CaptureDouble, small_job
+from capture_double import BRIEF, CaptureDouble, small_job
 from pydantic import TypeAdapter
 
 from pipelines.archive import Archive, Run
@@ -19,6 +19,9 @@ from pipelines.programming.job import chosen_units, document, program_run, stati
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from stations.opening import make_plant
 from stations.plant.plant import Plant
+
+LOT = (BRIEF[2], BRIEF[4])
+"""Changes of the small recipe: without a static record, and limits without its figures."""
 
 
 @dataclass
@@ -43,7 +46,7 @@ class PlantDouble(CaptureDouble):
 
 def lot_run(folder: Path) -> Run:
     """A finished run of three units in an archive in a folder; its station continues from its beginning."""
-    job = small_job(folder)
+    job = small_job(folder, *LOT)
     plant = make_plant(job.station, job.lot)
     runner = Runner(job, Archive(folder / "archive"), measure=PlantDouble(plant=plant))
     list(runner.all())

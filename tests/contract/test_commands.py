@@ -4,6 +4,7 @@ import re
 import shlex
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
@@ -31,9 +32,15 @@ def leaves(command: object) -> Iterator[TyperCommand]:
         yield from leaves(one)
 
 
+@cache
+def help_of(columns: int, *words: str) -> str:
+    """The help of the program or of a command, so wide."""
+    return CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": str(columns), "NO_COLOR": "1"}).stdout
+
+
 @each(COMMANDS)
 def test_a_command_is_in_the_help_and_the_documents_and_explains_itself_and_every_option(name: str) -> None:
-    text = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200"}).stdout
+    text = help_of(200)
     summary = COMMANDS[name].summary
     assert re.search(rf"│ {name} +{re.escape(summary)} +│", text)
     assert summary.endswith(".")
@@ -50,7 +57,7 @@ def test_a_command_is_in_the_help_and_the_documents_and_explains_itself_and_ever
 def test_the_help_of_a_command_shows_two_examples_with_options_that_exist(name: str) -> None:
     examples = import_module(f"pipelines.cli.{COMMANDS[name].module}").EXAMPLES
     assert len(set(examples)) == 2
-    text = CliRunner().invoke(app, [name, "--help"], env={"COLUMNS": "160"}).stdout
+    text = help_of(160, name)
     for example in examples:
         assert example in text
         words = shlex.split(example)
@@ -65,7 +72,7 @@ def test_the_help_of_a_command_shows_two_examples_with_options_that_exist(name: 
 def test_the_help_of_a_subcommand_shows_two_examples_of_its_own(name: str) -> None:
     group = get_command(app).get_command(None, name)._load()
     for own, leaf in getattr(group, "commands", {}).items():
-        text = CliRunner().invoke(app, [name, own, "--help"], env={"COLUMNS": "160"}).stdout
+        text = help_of(160, name, own)
         examples = re.findall(rf"^ *(tumbleline {name}\b.*?) *$", text.split("Examples:")[1], re.MULTILINE)
         assert len(set(examples)) == 2, own
         for example in examples:
@@ -82,7 +89,7 @@ def test_help_needs_eighty_columns_breaks_no_option_and_its_parts_stand_together
         group = get_command(app).get_command(None, name)._load()
         subcommands = [[name, own] for own in getattr(group, "commands", {})]
         for words in [[name], *subcommands]:
-            text = CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": "80", "NO_COLOR": "1"}).stdout
+            text = help_of(80, *words)
             lines = text.splitlines()
             assert [line for line in lines if len(line) > 80 and not line.lstrip().startswith("tumbleline ")] == []
             if len(words) == 1 and subcommands:

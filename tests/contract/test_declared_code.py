@@ -2,11 +2,12 @@
 
 import ast
 from functools import cache
+from pathlib import Path
 
 from each import each
 
+from pipelines.archive import keys
 from pipelines.archive.code import CODE
-from pipelines.archive.keys import sources
 from pipelines.chain.chain import BY_NAME
 
 OWN = ("inertial", "schemas", "stations", "pipelines")
@@ -39,6 +40,12 @@ TABLES = "schemas.tables"  # what is stored is held against its columns
 DISCOVERED = ("inertial.effects",)
 
 
+@cache
+def sources(*modules: str) -> dict[str, Path]:
+    """Files of modules and of what is below them, by name."""
+    return keys.sources(modules)
+
+
 def _names(node: ast.AST, used: set[str], imported: list[ast.ImportFrom | ast.Import]) -> None:
     """Names that run, and imports; annotations and blocks for type checkers are left out."""
     if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
@@ -56,7 +63,7 @@ def _names(node: ast.AST, used: set[str], imported: list[ast.ImportFrom | ast.Im
 
 @cache
 def _imports(module: str) -> frozenset[str]:
-    path = sources([module])[module]
+    path = sources(module)[module]
     used: set[str] = set()
     imported: list[ast.ImportFrom | ast.Import] = []
     _names(ast.parse(path.read_text("utf-8")), used, imported)
@@ -69,25 +76,26 @@ def _imports(module: str) -> frozenset[str]:
     return frozenset(name for name in found if name.split(".")[0] in OWN and name in ALL)
 
 
-ALL = set(sources(OWN))
+ALL = set(sources(*OWN))
 
 
+@cache
 def _without_code(module: str) -> bool:
     """Whether a module is a package's first file with nothing but a docstring."""
-    path = sources([module])[module]
+    path = sources(module)[module]
     return path.name == "__init__.py" and len(ast.parse(path.read_text("utf-8")).body) <= 1
 
 
 def needed(starts: str) -> set[str]:
     """Modules that run, with what they import, at any depth."""
-    left = [name for start in (*starts.split(), TABLES) for name in sources([start])]
+    left = [name for start in (*starts.split(), TABLES) for name in sources(start)]
     found: set[str] = set()
     while left:
         name = left.pop()
         if name not in found:
             found.add(name)
             left += _imports(name)
-            left += sources([name]) if name in DISCOVERED else ()
+            left += sources(name) if name in DISCOVERED else ()
     return {name for name in found if not _without_code(name)}
 
 
@@ -95,5 +103,5 @@ def needed(starts: str) -> set[str]:
 def test_a_key_takes_in_every_module_that_its_result_runs_and_no_room_that_it_does_not_use(result: str) -> None:
     assert set(BY_NAME) <= set(CODE) == set(STARTS)
     run = needed(STARTS[result])
-    assert sorted(run - set(sources(CODE[result]))) == []
-    assert [name for name in CODE[result] if not run & set(sources([name]))] == []
+    assert sorted(run - set(sources(*CODE[result]))) == []
+    assert [name for name in CODE[result] if not run & set(sources(name))] == []

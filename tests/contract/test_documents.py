@@ -20,41 +20,22 @@ from pipelines.cli import COMMANDS
 
 KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 BY_HEAD = {head_of(kind): kind for kind in documents()}
-IMPORTED = ["--map", "x=x,y=y,z=z", "--unit-of", "output=g", "--rate", "100", "--units", "S1", "--set", "face=+z"]
-IMPORTED += ["--set", "block_s=5", "--set", "local_gravity_m_s2=9.81"]
-CORRECTED = ["--rate", "100", "--track", "0,0,1", "--set", "turn_on=100"]
 CASES = {
-    "plan --json": ["plan"],
-    "station status --json": ["station", "status"],
-    "compare --json": ["compare", "latest", "--fresh", "latest"],
-    "history --json": ["history", "{folder}/model.toml", "--dwells", "latest"],
-    "list --json": ["list"],
-    "inspect FILE --json": ["inspect", "{folder}/record.csv"],
     "show RUN --json": ["show"],
     "show RUN TABLE --json": ["show", "latest", "coefficients"],
     "show UNIT --at DATE --json": ["show", "A1", "--at", "2026-06-01"],
     "verify --json": ["verify"],
-    "audit --json": ["audit"],
-    "rerun --json": ["rerun", "latest", "--effects", "bias,scale,misalignment,bias_temperature"],
     "rerun --check --json": ["rerun", "latest", "--check"],
-    "archive query --json": ["archive", "query", "select * from units"],
     "archive diff --json": ["archive", "diff", "latest", "latest"],
     "release whatif --json": ["release", "whatif", "{folder}/model.toml"],
-    "station check --json": ["station", "check", "--read-only"],
-    "station log --json": ["station", "log"],
     "import FILE --procedure sweep": ["import", "{folder}/sweep.csv", "--procedure", "sweep", "--units", "S1"],
     "import FILE… --procedure NAME --map reference=…": [
         "import", *["{folder}/step.csv"] * 4, "--units", "S1", "--procedure", "step_response",
         "--map", "z=out [V],reference=drive [V]", "--rate", "50000",
     ],
-    "run --json": ["fit", "latest", "--limits", "consumer"],
-    "noise allan --json": ["noise", "allan", "{folder}/rest.csv", "--rate", "100"],
-    "noise psd --json": ["noise", "psd", "{folder}/rest.csv", "--rate", "100"],
     "doctor --json": ["doctor"],
     "station monitor --json": ["station", "monitor"],
-    "plan keys [SUBJECT] --json": ["plan", "keys", "recipe"],
     "show RUN --report --json": ["show", "latest", "--report"],
-    "extend --json": ["extend", "{folder}/model.toml", "second_order"],
     "release MODEL --json": [
         "release", "{folder}/model.toml", "--since", "2026-01-01", "--force", "--reason", "a test",
     ],
@@ -62,22 +43,15 @@ CASES = {
     "certificate list --json": ["certificate", "list"],
     "certificate revoke UNIT --json": ["certificate", "revoke", "A1", "--reason", "a test"],
     "lineage UNIT|RUN|FILE --json": ["lineage", "A1"],
-    "import FILE… --json": ["import", "{folder}/rest.csv", *IMPORTED],
-    "import FILE FILE… --json": ["import", "{folder}/rest.csv", "{folder}/rest.csv", *IMPORTED],
-    "correct --json": ["correct", "{folder}/corrected.csv", "latest:A1", *CORRECTED],
-    "station watch --json": ["station", "watch", "latest"],
     "station profiles --json": ["station", "profiles"],
     "station frames --json": ["station", "frames", str(ROOT / "tests" / "data" / "frames" / "mbpoll-tcpdump.pcap")],
     "archive clean --json": ["archive", "clean", "--dry-run"],
     "archive key --json": ["archive", "key", "--output", "{folder}/key.pem"],
     "archive compact --json": ["archive", "compact"],
-    "discover --json": ["discover"],
     "attributes add --json": ["attributes", "add", "{folder}/units.csv"],
-    "attributes list --json": ["attributes", "list"],
     "archive backup --json": ["archive", "backup", "{folder}/copy"],
 }  # fmt: skip
-WITHOUT_ARCHIVE = {"station frames", "plan", "inspect FILE", "plan keys [SUBJECT]", "extend", "archive key"}
-WITHOUT_ARCHIVE |= {f"station {one}" for one in ("status", "check", "profiles")}
+WITHOUT_ARCHIVE = {"station frames", "archive key", "station profiles"}
 
 
 @pytest.fixture(scope="module")
@@ -92,16 +66,11 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
         validate(BY_HEAD["certificate issue --json"], out)
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
-    rows = [f"{k / 10},{k % 3},{k % 2},16{k % 10}" for k in range(200)]
-    (folder / "record.csv").write_text("\n".join(["t,ax,ay,az", *rows, ""]), encoding="utf-8")
     (folder / "units.csv").write_text("serial,wafer\nA1,W1\n", encoding="utf-8")
     rng = np.random.default_rng(1)
-    np.savetxt(folder / "rest.csv", rng.normal(size=(2000, 3)), delimiter=",", header="x,y,z", comments="")
     time = np.arange(1000) / 50e3 - 0.003
     step = np.column_stack([0.3 * step_response(time, 900.0, 0.6) + 1e-4 * rng.normal(size=1000), 2.0 * (time > 0.0)])
     np.savetxt(folder / "step.csv", step, delimiter=",", header="out [V],drive [V]", comments="")
-    rows = np.column_stack([1e-6 * rng.normal(size=(200, 3)) + [0.0, 0.0, 1.0], np.full(200, 25.0)])
-    np.savetxt(folder / "corrected.csv", rows, delimiter=",", header="x,y,z,unit_C", comments="")
     f = np.geomspace(5.0, 4000.0, 30)
     h = -transfer(f, 2500.0, 0.7)
     rows = [f"{a:.6g},{abs(b):.6g},{np.degrees(np.angle(b)):.6g},0.2,0.2" for a, b in zip(f, h, strict=True)]
@@ -126,6 +95,28 @@ def test_a_command_prints_the_document_of_its_type(head: str, kept: Path, tmp_pa
 
 
 ELSEWHERE = {
+    "plan keys [SUBJECT] --json": "contract/test_keys.py",
+    "audit --json": "e2e/test_audit.py",
+    "archive query --json": "e2e/test_audit.py",
+    "list --json": "e2e/test_command_line.py",
+    "run --json": "e2e/test_command_line.py",
+    "correct --json": "e2e/test_correct.py",
+    "discover --json": "e2e/test_discover.py",
+    "attributes list --json": "e2e/test_discover.py",
+    "inspect FILE --json": "e2e/test_import.py",
+    "import FILE… --json": "e2e/test_import.py",
+    "import FILE FILE… --json": "e2e/test_import.py",
+    "compare --json": "e2e/test_models.py",
+    "history --json": "e2e/test_models.py",
+    "extend --json": "e2e/test_models.py",
+    "noise allan --json": "e2e/test_noise_commands.py",
+    "noise psd --json": "e2e/test_noise_commands.py",
+    "plan --json": "e2e/test_plan.py",
+    "rerun --json": "e2e/test_run_that_ends.py",
+    "station status --json": "e2e/test_station_commands.py",
+    "station check --json": "e2e/test_station_commands.py",
+    "station log --json": "e2e/test_station_commands.py",
+    "station watch --json": "e2e/test_station_commands.py",
     "diagnose --json": "e2e/test_diagnosis.py",
     "improve --json": "e2e/test_models.py",
     "run --json (several fillings)": "e2e/test_operator.py",

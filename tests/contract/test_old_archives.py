@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble
 from root_process import ROOT
 
 from deploy.release import unpack
@@ -13,9 +12,7 @@ from pipelines.certificates import Ledger
 from pipelines.certificates.measured import measured_on
 from pipelines.chain import certify as certifying
 from pipelines.chain.certify import certify
-from pipelines.chain.runner import Runner
 from pipelines.integrity import verify
-from pipelines.jobs.job import job_of_run
 from pipelines.jobs.model_change import ModelChange
 from pipelines.lineage import lineage
 from pipelines.rerun.rerun import again
@@ -56,24 +53,16 @@ def test_nothing_new_is_certified_on_noise_only_and_what_was_certified_then_is_t
     assert {"certificate", "samples", "table", "station", "recipe"} <= kinds
 
 
-def test_it_is_fitted_anew_without_measuring_again(run: Run) -> None:
-    linear = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
-    job = job_of_run(run, effects=[*linear, "second_order"])
-    runner = Runner(job, run.archive, measure=CaptureDouble(stop_after=0))
-    stages = {done.stage: done.reused for done in runner.all()}
-    assert stages["capture"]
-    assert not stages["fit"]
-    assert set(runner.run.table("grades")["unit"]) == {"A1", "A2"}
-    # run again by a version that knows the budget, but without a statement
-    with pytest.raises(WrongUse, match="noise only"):
-        certify(Ledger(run.archive), runner.run, start=measured_on(runner.run))
-
-
 def test_it_is_run_again_since_its_keys_are_of_other_code_and_then_no_more(run: Run) -> None:
     first = again(run.archive, run.id, ModelChange())
     assert {cause["what"] for cause in first.because} == {"code"}
     assert {name for name, done in first.stages.items() if done != "computed"} == {"capture"}
     assert again(run.archive, first.new, ModelChange()).because == []
+    renewed = run.archive.run(first.new)
+    assert set(renewed.table("grades")["unit"]) == {"A1", "A2"}
+    # run again by a version that knows the budget, but without a statement
+    with pytest.raises(WrongUse, match="noise only"):
+        certify(Ledger(run.archive), renewed, start=measured_on(renewed))
     assert verify(run.archive, keys={}).checked.findings == []
 
 

@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from capture_double import BRIEF, CaptureDouble, small_job
+from capture_double import BRIEF, CaptureDouble, finished_run, small_job
 from each import each
 from in_process import document_of, given, text_of
 
@@ -134,7 +134,7 @@ def test_an_older_copy_restored_leaves_the_checkpoint_of_records_measured_since(
 
 def test_a_copy_of_another_archive_or_into_itself_is_refused(made: Path, tmp_path: Path) -> None:
     archive = Archive(made / "archive")
-    measure(tmp_path, 7)
+    finished_run(tmp_path, *BRIEF)
     with pytest.raises(ArchiveUnusable, match=r"a chain that .* does not have, an earlier copy"):
         copy_archive(archive, Archive(tmp_path / "archive"))
     with pytest.raises(WrongUse, match="lies in the archive"):

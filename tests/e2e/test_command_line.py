@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from capture_double import AT_ROOM, recipe_file
+from capture_double import BRIEF, recipe_file
 from each import each
 from in_process import document_of, given, text_of, typed_document
 from root_process import ROOT
@@ -26,16 +26,14 @@ KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An archive with one run of a small lot, made by the command itself without the orchestrator."""
     folder = tmp_path_factory.mktemp("line")
-    status, out, err = given(
-        "run", recipe_file(folder, *AT_ROOM), "--direct", "--json", "--archive", folder / "archive"
-    )
+    status, out, err = given("run", recipe_file(folder, *BRIEF), "--direct", "--json", "--archive", folder / "archive")
     assert status in (0, 1), err
     (folder / "run.json").write_text(out, encoding="utf-8")
     (folder / "run.err").write_text(err, encoding="utf-8")
     return folder / "archive"
 
 
-def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path) -> None:
+def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path, measured: Archive) -> None:
     document = typed_document("run", (archive.parent / "run.json").read_text(encoding="utf-8"))
     assert [unit["unit"] for unit in document["units"]] == ["A1", "A2", "A3"]
     assert document["passed"] + document["failed"] + document["refused"] == 3
@@ -47,7 +45,7 @@ def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path) -
     printed = text_of("show", "--archive", archive)
     assert all(unit in printed for unit in ("A1", "A2", "A3", "report"))
     # every statistic of the static record is made from its samples
-    words = ("noise", "allan", "latest", "--archive", archive)
+    words = ("noise", "allan", "latest", "--archive", measured.root)
     usual, total = document_of(*words), document_of(*words, "--statistic", "total")
     assert (total["statistic"], total["deviation_unit"], usual["deviation_unit"]) == ("total", "µg", "µg")
     assert total["terms"] == usual["terms"]

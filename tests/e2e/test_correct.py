@@ -12,6 +12,7 @@ from c_compiler import FIXED, REAL, compiled
 from capture_double import LSB_PER_G, CaptureDouble, small_job
 from each import each
 from in_process import document_of, given, refused, text_of
+from long_suites import mostly_slow
 from scipy import signal
 from scipy.io import loadmat
 from test_guides import wrong
@@ -193,33 +194,33 @@ def tracked(run: Run, rng: np.random.Generator) -> pd.DataFrame:
     return table
 
 
+@pytest.mark.parametrize("kind", mostly_slow(("butterworth", "fir", "moving-average"), "butterworth"))
 def test_the_filters_are_those_of_scipy_and_of_the_exported_c_with_the_bias(
-    run: Run, home: Path, rng: np.random.Generator
+    run: Run, home: Path, rng: np.random.Generator, kind: str
 ) -> None:
     table = tracked(run, rng)
     own = ("--set", "turn_on=2000")
     _, plain = corrected(run, table, *own)
     force = plain[FORCES].to_numpy()
-    for kind in ("butterworth", "fir", "moving-average"):
-        document, done = corrected(run, table, *own, "--filter", f"{kind}:9")
-        one = document["filter"]
-        b, a = (np.array(one[name]) for name in ("numerator", "denominator"))
-        expected = signal.lfilter(b, a, force - force[0], axis=0) + force[0]
-        assert np.allclose(done[FORCES].to_numpy(), expected, atol=1e-12)
-        f, h = signal.freqz(b, a, fs=RATE, worN=2**14)
-        assert one["cutoff_hz"] == pytest.approx(f[np.argmax(np.abs(h) < np.sqrt(0.5))], abs=0.02)
-        assert one["cutoff_hz"] == pytest.approx(9.0, rel=0.03 if kind == "moving-average" else 1e-3)  # whole samples
-        assert one["delay_s"] == pytest.approx(float(-np.angle(h[4])) / (2 * np.pi * f[4]), rel=1e-3)
-        assert one["noise_bandwidth_hz"] == pytest.approx(float(np.trapezoid(np.abs(h) ** 2, f)), rel=1e-3)
-        after = slice(8000, None)
-        fall = done[FORCES].to_numpy()[after].var(axis=0) / force[after].var(axis=0)
-        assert fall.mean() == pytest.approx(2.0 * one["noise_bandwidth_hz"] / RATE, rel=0.3)
-        assert done["u_x_ug"].iloc[-1] < plain["u_x_ug"].iloc[-1]
-        words = f"--format c --include failed --units A1 --filter {kind}:9 --rate 100 --set track=yes".split()
-        assert given("export", run.id, "--archive", run.archive.root, *words, *own, "--output", "out.h")[0] == 0
-        header = Path("out.h").read_text(encoding="utf-8")
-        rows = table[["x", "y", "z", "unit_C"]].to_numpy()
-        assert np.max(np.abs(compiled(header, FILTERED_C, rows, home, "A1") - done[FORCES].to_numpy())) < 1e-10
+    document, done = corrected(run, table, *own, "--filter", f"{kind}:9")
+    one = document["filter"]
+    b, a = (np.array(one[name]) for name in ("numerator", "denominator"))
+    expected = signal.lfilter(b, a, force - force[0], axis=0) + force[0]
+    assert np.allclose(done[FORCES].to_numpy(), expected, atol=1e-12)
+    f, h = signal.freqz(b, a, fs=RATE, worN=2**14)
+    assert one["cutoff_hz"] == pytest.approx(f[np.argmax(np.abs(h) < np.sqrt(0.5))], abs=0.02)
+    assert one["cutoff_hz"] == pytest.approx(9.0, rel=0.03 if kind == "moving-average" else 1e-3)  # whole samples
+    assert one["delay_s"] == pytest.approx(float(-np.angle(h[4])) / (2 * np.pi * f[4]), rel=1e-3)
+    assert one["noise_bandwidth_hz"] == pytest.approx(float(np.trapezoid(np.abs(h) ** 2, f)), rel=1e-3)
+    after = slice(8000, None)
+    fall = done[FORCES].to_numpy()[after].var(axis=0) / force[after].var(axis=0)
+    assert fall.mean() == pytest.approx(2.0 * one["noise_bandwidth_hz"] / RATE, rel=0.3)
+    assert done["u_x_ug"].iloc[-1] < plain["u_x_ug"].iloc[-1]
+    words = f"--format c --include failed --units A1 --filter {kind}:9 --rate 100 --set track=yes".split()
+    assert given("export", run.id, "--archive", run.archive.root, *words, *own, "--output", "out.h")[0] == 0
+    header = Path("out.h").read_text(encoding="utf-8")
+    rows = table[["x", "y", "z", "unit_C"]].to_numpy()
+    assert np.max(np.abs(compiled(header, FILTERED_C, rows, home, "A1") - done[FORCES].to_numpy())) < 1e-10
 
 
 def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path, rng: np.random.Generator) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import small_run
+from capture_double import AT_ROOM, small_run
 from each import each
 from in_process import document_of, given, refused, text_of
 from root_process import ROOT
@@ -140,8 +140,9 @@ def test_unusable_input_is_one_message(
     message = refused("diagnose", "d.parquet", *words.split())
     assert [part for part in UNUSABLE[words].split("; ") if part not in message] == [], message
     assert not Path("next.toml").exists()
-    pd.read_parquet("d.parquet").rename(columns={"out_x": "outx"}).to_csv("d.csv", index=False)
-    assert "column out_x is missing; out_x: did you mean outx" in refused("diagnose", "d.csv")
+    if words == "--output next.toml":
+        pd.read_parquet("d.parquet").rename(columns={"out_x": "outx"}).to_csv("d.csv", index=False)
+        assert "column out_x is missing; out_x: did you mean outx" in refused("diagnose", "d.csv")
 
 
 @pytest.mark.usefixtures("no_next_measurement")
@@ -203,7 +204,9 @@ def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name
 
 
 @pytest.mark.usefixtures("no_next_measurement")
-def test_the_course_of_a_day_is_offered_with_its_period_and_makes_the_model_adequate(tmp_path: Path, capsys) -> None:
+def test_the_course_of_a_day_is_offered_with_its_period_and_leaves_no_more_than_the_noise(
+    tmp_path: Path, capsys
+) -> None:
     run = case("withheld", 5, 771)
     run.dwells.to_parquet(tmp_path / "dwells.parquet")
     run.history.to_parquet(tmp_path / "history.parquet")
@@ -219,9 +222,8 @@ def test_the_course_of_a_day_is_offered_with_its_period_and_makes_the_model_adeq
     offer, rate = document["offer"], 2.0 * np.pi * 3600.0 / period
     assert float(offer["columns"][0].split("(")[1].split()[0]) == pytest.approx(rate, rel=0.01)
     formula = ("--formula", f"{offer['id']}={'; '.join(offer['columns'])}")
-    after = document_of("diagnose", *data, f"bias,scale,misalignment,{offer['id']}", *formula, status=0)
-    assert after["adequate"] is True
-    assert after["error"]["rms_ug"] == pytest.approx(floor, rel=0.05)
+    after = document_of("compare", *data, f"bias,scale,misalignment,{offer['id']}", *formula, status=0)
+    assert after["rms_ug"] == pytest.approx(floor, rel=0.05)
 
 
 @pytest.mark.usefixtures("no_next_measurement")
@@ -235,11 +237,8 @@ def test_an_effect_file_takes_part_and_the_lines_after_it_carry_it_and_dwells_le
     words = ("diagnose", humid / "dwells.parquet", "--effect-file", "my damp.py", "--leave-out", left)
     with effects.additions_forgotten():
         _, out, _ = given(*words)
-    with effects.additions_forgotten():
-        document = document_of(*words, status=1)
-    assert "damp" in {name for group in document["classes"] for name in group["effects"]}
-    assert "damp" in document["recommended"]
     lines = printed_commands(out.split("Next:", 1)[1])
+    assert "damp" in {word for one in lines for word in one}
     assert [one[0] for one in lines] == [*["extend"] * (len(lines) - 1), "history"]
     assert all(one[one.index("--effect-file") + 1] == "my damp.py" for one in lines)
     assert lines[-1][lines[-1].index("--leave-out") + 1] == left
@@ -274,8 +273,8 @@ def test_an_installed_package_takes_part(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 @pytest.mark.usefixtures("no_next_measurement")
 def test_a_run_brings_its_history_and_its_own_model_unless_another_is_named(tmp_path: Path) -> None:
-    plain = '"scale_temperature"]'
-    run = small_run(tmp_path, None, (plain, plain.replace("]", ', "second_order"]')))
+    plain = '"misalignment"]'
+    run = small_run(tmp_path, None, *AT_ROOM, (plain, plain.replace("]", ', "second_order"]')))
     own, where = run.about["recipe"]["effects"], ("--archive", run.archive.root)
     compared = document_of("compare", "latest", "--fresh", run.id, *where)
     assert compared["fresh_rms_ug"] == pytest.approx(compared["rms_ug"], rel=0.01)
@@ -287,7 +286,7 @@ def test_a_run_brings_its_history_and_its_own_model_unless_another_is_named(tmp_
 
 
 def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(tmp_path: Path) -> None:
-    run, model = small_run(tmp_path), tmp_path / "model.toml"
+    run, model = small_run(tmp_path, None, *AT_ROOM), tmp_path / "model.toml"
     own = json.dumps([*run.about["recipe"]["effects"], "curl"])
     head = f'[model]\nname = "line"\nversion = 1\neffects = {own}\n'
     model.write_text(head + FORMULA.format("curl", "fj*fk*maximum(fj, 0)"), encoding="utf-8")

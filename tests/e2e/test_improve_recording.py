@@ -109,6 +109,13 @@ def test_a_doubt_and_too_few_positions_are_refused_with_what_to_add(rng: np.rand
     few = frame[frame[0] < hand.time[-1] * 0.3]
     few.to_csv("few.csv", header=False, index=False)
     assert "10 positions at rest" in refused("improve", "few.csv")
+    frame.to_csv("a.csv", index=False)
+    assert "'latest' is no file; give one run, or files only" in refused("improve", "latest", "a.csv")
+    columns = ["unit", "dwell", "time_s", "out_x", "out_y", "out_z"]
+    tables = pd.DataFrame([["A", 0, 0.0, 0.0, 0.0, 1.0]], columns=columns)
+    for name in ("d1.csv", "d2.csv"):
+        tables.to_csv(name, index=False)
+    assert "2 tables of dwells, one is needed" in refused("improve", "d1.csv", "d2.csv")
     assert not Path("archive").exists()
 
 
@@ -132,6 +139,7 @@ def test_six_faces_are_named_by_what_they_read_and_two_exchanged_labels_are_told
     assert "with +x and +y exchanged they agree" in answer["reason"]
 
 
+@pytest.mark.slow  # an improvement of a record adds an effect: tests/e2e/test_python.py
 def test_a_changed_model_is_not_shown_with_the_coefficients_of_the_import(rng: np.random.Generator) -> None:
     """A cubic term of 4 mg/g³, taken for scale by the fit of the import."""
     force = rng.standard_normal((24, 3))
@@ -151,8 +159,9 @@ def test_a_changed_model_is_not_shown_with_the_coefficients_of_the_import(rng: n
     assert "scale 0.1031" in given("fit", run, "--model", "model.toml")[1]  # 1.012 over 9.80665
 
 
+@pytest.mark.slow  # as one recording: tests/e2e/test_python.py and test_import.py
 def test_several_files_of_one_sensor_are_one_recording_in_one_command(rng: np.random.Generator) -> None:
-    """Two sessions with a clock that restarts; a run beside a file, and two tables of dwells, are refused."""
+    """Two sessions with a clock that restarts."""
     _, frame = hand_held(rng, stops=28, rate=50.0)
     half = len(frame) // 2
     for name, part in (("a.csv", frame.iloc[:half]), ("b.csv", frame.iloc[half:])):
@@ -164,9 +173,3 @@ def test_several_files_of_one_sensor_are_one_recording_in_one_command(rng: np.ra
     assert "--set join=rows" in one["command"]
     assert 26 <= one["dwells"] <= 30
     assert document_of(*shlex.split(one["command"])[1:], status=0)["run"] == one["run"]
-    assert "'latest' is no file; give one run, or files only" in refused("improve", "latest", "a.csv")
-    columns = ["unit", "dwell", "time_s", "out_x", "out_y", "out_z"]
-    tables = pd.DataFrame([["A", 0, 0.0, 0.0, 0.0, 1.0]], columns=columns)
-    for name in ("d1.csv", "d2.csv"):
-        tables.to_csv(name, index=False)
-    assert "2 tables of dwells, one is needed" in refused("improve", "d1.csv", "d2.csv")

@@ -38,7 +38,7 @@ def raised(path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> ImportErro
     return caught.value
 
 
-@each([("typer", "--help"), ("rich", "doctor"), ("pydantic", "plan production"), ("pandas", "plan production")])
+@each([("typer", "--help"), ("pandas", "plan production")])
 def test_a_missing_library_is_one_line_with_the_remedy(case: tuple[str, str], tmp_path: Path) -> None:
     missing, words = case
     command = [sys.executable, "-c", START.format(missing=missing), *words.split()]

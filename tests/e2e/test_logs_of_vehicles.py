@@ -1,24 +1,17 @@
-"""Logs of autopilots, robots and vehicles, and spreadsheets, from the file to a model; and such files when they are damaged."""
+"""Logs of autopilots, robots and vehicles, and spreadsheets, from the file to a model."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from each import each
 from in_process import command
-from long_suites import mostly_slow
 
 from pipelines.importers import files
 from pipelines.importers.triads import triad
-from schemas.errors import DataRejected, TumblelineError, WrongUse
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "contract"))
-import test_readers as samples
+from schemas.errors import DataRejected, WrongUse
 
 pytestmark = pytest.mark.usefixtures("no_next_measurement")
 
-NEW = ("spreadsheet", "ulog", "dataflash", "mcap", "rosbag", "mdf4", "miniseed", "rosbag2", "wearable")
 FACES = 9.81 * np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
 IMU = """\
 std_msgs/Header header
@@ -104,24 +97,3 @@ def test_positions_logged_back_to_back_are_faces_by_their_own_names_and_an_array
     outputs = six_faces(30)
     columns = {f"accelerometer_m_s2[{k}]": outputs[:, k] for k in range(3)} | {"gyro_rad[0]": np.arange(180.0)}
     assert triad(columns, {}).names == tuple(f"accelerometer_m_s2[{k}]" for k in range(3))
-
-
-@pytest.mark.parametrize("tries", mostly_slow([2, 5], 2))
-@each(NEW)
-def test_a_damaged_file_is_refused_in_one_message(name, tries, tmp_path):
-    path = tmp_path / "whole"
-    samples.SAMPLES[name](path)
-    whole = path.read_bytes()
-    rng = np.random.default_rng(5)
-    for k in range(1, tries + 1):
-        data = bytearray(whole[: len(whole) * (k + 1) // 6] if k % 2 else whole)
-        for place in rng.integers(8, max(len(data), 9), 4 * (k % 3)):
-            data[min(int(place), len(data) - 1)] = int(rng.integers(256))
-        damaged = tmp_path / f"damaged-{k}"
-        damaged.write_bytes(data)
-        told = ""
-        try:
-            files.read_content(damaged)
-        except TumblelineError as problem:
-            told = str(problem)
-        assert "\n" not in told

@@ -120,6 +120,7 @@ def test_another_file_takes_the_next_version_and_a_removed_effect_stays_in_the_h
     assert "they need --dwells" in refused("history", "m.toml", "--output", "p.png")
 
 
+@pytest.mark.slow  # with another scene: the demonstration below
 def test_the_guide_finds_adds_and_confirms_the_hidden_effect(improved: tuple[Path, str]) -> None:
     folder, out = improved
     assert "ADEQUATE" in out

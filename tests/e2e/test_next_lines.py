@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from capture_double import finished_run
 from in_process import document_of, given, text_of, typed_document
+from long_suites import mostly_slow
 from root_process import ROOT
 from typed_commands import printed_commands
 
@@ -112,7 +113,8 @@ def _improved(folder: Path) -> tuple[int, str, str]:
 CASES = {"rerun": _rerun, "run": _run, "history": _refuted, "import_": _imported, "improve_text": _improved}
 
 
-@pytest.mark.parametrize("module", CASES)
+# the lines of a run: tests/e2e/test_walk_of_recipes.py
+@pytest.mark.parametrize("module", mostly_slow(CASES, *(one for one in CASES if one != "run")))
 def test_the_lines_to_give_next_run_as_they_are_printed(module: str, kept_runs: Path) -> None:
     status, out, err = CASES[module](kept_runs)
     assert status in {0, 1}, err
@@ -232,24 +234,6 @@ def lagging() -> Run:
 
 
 pastable = pytest.mark.usefixtures("home", "no_next_measurement")
-
-
-@pastable
-def test_the_printed_lines_carry_the_history_and_confirm_the_effect(lagging: Run) -> None:
-    names = ("a/run7.parquet", "b/temperatures.parquet", "a/again.parquet", "b/again-temperatures.parquet")
-    written(lagging, dict(zip(("dwells", "history", "fresh", "fresh_history"), names, strict=True)))
-    _, out, _ = given("diagnose", "a/run7.parquet", "--temperatures", "b/temperatures.parquet")
-    lines = printed_commands(out.split("Next:", 1)[1])
-    assert [words[0] for words in lines] == ["extend", "history"]
-    assert lines[1][lines[1].index("--temperatures") + 1] == "b/temperatures.parquet"
-    told = "give it to history with --fresh and its temperatures with --fresh-temperatures"
-    assert told in " ".join(out.split())
-    pasted(lines)
-    again = ["--fresh", "a/again.parquet", "--fresh-temperatures", "b/again-temperatures.parquet"]
-    out = pasted([[*lines[1], *again]])
-    assert re.search(r"(?<!not )confirmed:", out)
-    assert "warning" not in out
-    assert "remove it from the model" not in out
 
 
 @pastable

@@ -89,11 +89,13 @@ def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have
     statistic: str, record: Path, tmp_path: Path
 ) -> None:
     peer, factor, unit = STATISTICS[statistic]
-    words = ("noise", "allan", record, *OF_G, "--statistic", statistic, "--map", "ax")
-    found = document_of(*words, "--output", tmp_path / "a.png", "--output", tmp_path / "a.html")
+    table, short = pd.read_csv(record).head(8000), tmp_path / "short.csv"  # of more the peer of some takes seconds
+    table.to_csv(short, index=False)
+    words = ("noise", "allan", short, *OF_G, "--statistic", statistic, "--map", "ax")
+    found = document_of(*words, "--output", tmp_path / "a.html")
     assert (found["statistic"], found["deviation_unit"]) == (statistic, unit)
     (curve,) = found["curves"]
-    values = pd.read_csv(record)["ax"].to_numpy()
+    values = table["ax"].to_numpy()
     expected = getattr(allantools, peer)(values, rate=RATE, data_type="freq", taus=np.array(curve["tau_s"]))[1]
     np.testing.assert_allclose(curve["deviation"], factor * expected, rtol=1e-9)
     assert set(curve["low"]) == {None} if statistic in WITHOUT_INTERVAL else within(curve)

@@ -17,11 +17,8 @@ def kinds(notebook: dict[str, Any]) -> list[list[str]]:
     return [[form for one in cell["outputs"] for form in one.get("data", {one["output_type"]: ""})] for cell in cells]
 
 
-@pytest.mark.parametrize(
-    "path",
-    [pytest.param(one, marks=() if one.stem == "your-own-recording" else pytest.mark.slow) for one in FILES],
-    ids=lambda one: one.stem,
-)
+@pytest.mark.slow  # what they do with the package: tests/e2e/test_python.py
+@pytest.mark.parametrize("path", FILES, ids=lambda one: one.stem)
 def test_a_notebook_runs_and_shows_what_it_did(path: Path) -> None:
     assert len(FILES) == 3
     kept = json.loads(path.read_text(encoding="utf-8"))

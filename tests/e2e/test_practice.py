@@ -52,6 +52,7 @@ def until(happened: Callable[[], bool], what: str) -> None:
         time.sleep(0.2)
 
 
+@pytest.mark.slow  # its file and its faults: the test below; a served station: test_station.py
 def test_the_served_station_is_reached_by_the_file_that_it_writes_and_takes_typed_faults(tmp_path: Path) -> None:
     where = tmp_path / "line" / "station.toml"
     with started("demo", "--station", "--folder", "line", "--json") as process:

@@ -123,9 +123,9 @@ def copied(line: str) -> bool:
 
 
 @pytest.mark.parametrize(
-    # a diagnosis searches for the next measurement; its text in the guides: tests/e2e/test_guides.py
+    # a diagnosis searches for the next measurement, its text: tests/e2e/test_guides.py; the table of a fit is that of a run
     "name",
-    [pytest.param(one, marks=pytest.mark.slow if one == "diagnose" else ()) for one in OUTPUTS],
+    [pytest.param(one, marks=pytest.mark.slow if one in {"diagnose", "fit"} else ()) for one in OUTPUTS],
 )
 def test_a_command_prints_the_approved_text_in_eighty_columns(name: str, folder: Path) -> None:
     if name in BEFORE:

@@ -1,23 +1,18 @@
 """Re-runs from the command line: here, in several processes and on a Dask cluster, with the same bytes everywhere."""
 
-import json
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from hashlib import sha256
 from pathlib import Path
 
-import pandas as pd
 import pytest
 from capture_double import CaptureDouble, small_job, small_run
-from in_process import text_of
 
-from pipelines.archive import Archive, parquet
+from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from schemas import tables as contracts
 
 LINEAR = "bias,scale,misalignment,bias_temperature,scale_temperature"
 LARGER = f"{LINEAR},third_order"
@@ -49,22 +44,6 @@ def process_of(archive: Path, *how: str) -> subprocess.Popen[bytes]:
 
 def tables(archive: Path) -> dict[str, bytes]:
     return {str(path.relative_to(archive)): path.read_bytes() for path in sorted(archive.glob("runs/*/*.parquet"))}
-
-
-@pytest.mark.slow  # a check of one run: tests/unit/pipelines/rerun/test_rerun.py
-def test_check_proves_the_archive_and_names_a_value_that_was_exchanged_with_its_hash(own: Path) -> None:
-    words = ("rerun", "all", "--check", "--archive", own)
-    assert "3 of 3 runs reproduced: 75 tables" in text_of(*words, *ALONE, status=0)
-    place = own / "runs" / Archive(own).runs()[0].id
-    figures = pd.read_parquet(place / "figures.parquet")
-    figures.loc[2, "value"] += 1.0
-    data = parquet.table_bytes("figures", figures, contracts.VERSION)
-    (place / "figures.parquet").write_bytes(data)
-    manifest = json.loads((place / "figures.json").read_text())
-    (place / "figures.json").write_text(json.dumps(manifest | {"sha256": sha256(data).hexdigest()}))
-    told = text_of(*words, *ALONE, status=1)
-    assert "figures: value in 1 of" in told
-    assert "2 of 3 runs reproduced" in told
 
 
 @pytest.mark.slow

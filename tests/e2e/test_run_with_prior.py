@@ -39,6 +39,7 @@ def test_a_lot_of_the_family_is_fitted_with_its_prior(tmp_path: Path) -> None:
     text_of("rerun", run.id, "--archive", root, "--check")
 
 
+@pytest.mark.slow  # the prior itself: tests/unit/pipelines/jobs/test_priors.py
 @pytest.mark.usefixtures("no_next_measurement")
 def test_a_unit_whose_wafer_is_known_leans_on_it(tmp_path: Path) -> None:
     recipe, root = with_prior(tmp_path, 'attribute = "wafer"'), tmp_path / "archive"

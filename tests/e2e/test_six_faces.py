@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from in_process import document_of
+from long_suites import mostly_slow
 
 from pipelines.archive import Archive
 from pipelines.diagnosis.imported_faces import MODEL
@@ -31,7 +32,7 @@ def recorded(rng: np.random.Generator, path: str, *, tilt_deg: float = 0.0, move
     return path
 
 
-@pytest.mark.parametrize(("tilt_deg", "adequate"), [(0.0, None), (0.6, False)])
+@pytest.mark.parametrize(("tilt_deg", "adequate"), mostly_slow([(0.0, None), (0.6, False)], (0.6, False)))
 def test_six_faces_have_one_verdict_and_one_uncertainty(
     rng: np.random.Generator,
     tilt_deg: float,
@@ -58,7 +59,7 @@ def test_six_faces_have_one_verdict_and_one_uncertainty(
     assert all(f"± {2.0 * u:.2g} g (k = 2;" in line for u, line in zip(stated, imported["lines"], strict=False))
 
 
-@pytest.mark.parametrize("moves", [True, False])
+@pytest.mark.parametrize("moves", mostly_slow([True, False], True))
 def test_labels_of_a_file_name_its_faces(rng: np.random.Generator, *, moves: bool) -> None:
     path = recorded(rng, "labels.csv", moves=moves)
     command = document_of("improve", path, "--yes", status=1)["recording"]["command"]

@@ -148,9 +148,14 @@ def ordered_recipe():
     return recipe.model_copy(update={"soaks": soaks, "temperatures_C": [s.temperature_C for s in soaks]})
 
 
-def test_small_steps_waits_readings_on_the_way_and_pauses_without_power_take_the_minutes_that_are_planned():
-    for recipe in (short_recipe(4, static_s=60.0, temperatures=(10.0, 15.0, 20.0, 15.0, 10.0)), ordered_recipe()):
-        planned_as_taken(recipe, station_of(), *told_and_true(recipe, station_of())[1:])
+SMALL_STEPS = short_recipe(4, static_s=60.0, temperatures=(10.0, 15.0, 20.0, 15.0, 10.0))
+
+
+@pytest.mark.parametrize(
+    "recipe", [pytest.param(SMALL_STEPS, marks=pytest.mark.slow), ordered_recipe()], ids=["steps", "waits"]
+)
+def test_small_steps_waits_readings_on_the_way_and_pauses_without_power_take_the_minutes_that_are_planned(recipe):
+    planned_as_taken(recipe, station_of(), *told_and_true(recipe, station_of())[1:])
 
 
 def test_devices_read_on_the_way_are_planned_at_the_temperatures_they_have_there():

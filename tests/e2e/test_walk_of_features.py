@@ -14,18 +14,8 @@ from schemas.errors import DONE, PART_FAILED
 
 PAGE = (ROOT / "docs" / "reference" / "features.md").read_text(encoding="utf-8")
 ROWS = re.findall(r"^\| (?P<feature>.+?) \| .*\| `(?P<command>tumbleline [^`]+)` \|$", PAGE, re.MULTILINE)
-LASTING = "run deploy/recipes/procedures/"
-SECONDS = ("plan deploy/", "diagnose ", "--fit norm", "fit latest", "--track", "track=yes", "allan latest")
-"""Beginnings of commands that take seconds, beside those of procedures."""
 UNITS = "SN1,SN2,SN3"
-
-
-def lasts(words: str) -> bool:
-    return any(part in words for part in (LASTING, *SECONDS))
-
-
-SHORT = list(dict.fromkeys(words for _, words in ROWS if not lasts(words)))
-LONG = list(dict.fromkeys(words for _, words in ROWS if lasts(words)))
+GIVEN = list(dict.fromkeys(words for _, words in ROWS))
 
 
 @pytest.fixture(scope="module")
@@ -63,15 +53,9 @@ def test_every_row_of_the_first_tables_has_a_command_and_open_rows_are_named() -
 HEADS = {"simulated devices", "models", "tests and figures"}
 
 
-def test_the_short_commands_of_the_list_of_features_end_with_a_result(folder: Path) -> None:
-    with chdir(folder):
-        wrong = [text for text in map(given, SHORT) if text]
-    assert wrong == []
-
-
-@pytest.mark.slow
+@pytest.mark.slow  # each exists with its options: tests/contract/test_printed_commands.py; and has a test of its own
 @pytest.mark.timeout(900)
-def test_the_long_commands_of_the_list_of_features_end_with_a_result(folder: Path) -> None:
+def test_the_commands_of_the_list_of_features_end_with_a_result(folder: Path) -> None:
     with chdir(folder):
-        wrong = [text for text in map(given, LONG) if text]
+        wrong = [text for text in map(given, GIVEN) if text]
     assert wrong == []

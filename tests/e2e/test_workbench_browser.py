@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pandas as pd
 import pytest
 from browser import Served, Tab, served, tab, until
 from capture_double import recipe_file, small_run
@@ -17,10 +15,9 @@ from long_suites import mostly_slow
 
 from pipelines.jobs.recipes import load_recipe
 
-SCRIPT = "<img src=x onerror=window.ran=1>"
-PAGES = (
-    "/units", "/run?run=latest", "/unit?run=latest", "/missing", "/upload", "/operator", "/models", "/plan", "/station", "/audit",
-)  # fmt: skip
+FEW = ("/units", "/run?run=latest", "/unit?run=latest", "/upload", "/station")
+PAGES = (*FEW, "/missing", "/operator", "/models", "/plan", "/audit")
+"""Those that compute for long, which are of the slow suite, are made of the same parts."""
 
 
 LOOKS: dict[str, dict[str, Any]] = {"screen": {}, "dark tablet": {"dark": True, "size": (820, 1180)}}
@@ -44,12 +41,15 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("look", mostly_slow(LOOKS, "screen"))
+@pytest.mark.parametrize(
+    ("look", "paths"), mostly_slow([("screen", FEW), *((look, PAGES) for look in LOOKS)], ("screen", FEW)),
+    ids=["few", *LOOKS],
+)  # fmt: skip
 def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybody(
-    bench: Served, browser: Any, look: str
+    bench: Served, browser: Any, look: str, paths: tuple[str, ...]
 ) -> None:
     with tab(browser, bench.address, **LOOKS[look]) as one:
-        for path in PAGES:
+        for path in paths:
             one.open(path)
             assert one.findings() == [], path
             assert one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth") <= 0, path
@@ -196,38 +196,3 @@ def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, bro
             lambda: rows.count() >= 1 and all("a2" in row.lower() for row in rows.all_inner_texts()),
             "the search answers",
         )
-
-
-@pytest.mark.slow  # uploads without a browser: tests/faults/test_uploads_of_strangers.py
-def test_an_upload_in_a_wrong_unit_says_so_and_is_corrected(bench: Served, browser: Any, tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
-    general = np.array(
-        [[0.6, 0.8, 0.0], [0.0, 0.6, -0.8], [0.8, 0.0, 0.6], [-0.6, 0.0, 0.8], [0.0, -0.8, -0.6], [-0.8, -0.6, 0.0]]
-    )
-    faces = np.concatenate([np.eye(3), -np.eye(3), general])
-    moving = 0.2 * rng.normal(size=(len(faces), 40, 3))
-    parts = [np.concatenate([np.tile(face, (200, 1)), face + moved]) for face, moved in zip(faces, moving, strict=True)]
-    output = 9.80665 * (np.concatenate(parts) + 1e-4 * rng.normal(size=(len(faces) * 240, 3)))
-    frame = pd.DataFrame(
-        {"t": np.arange(len(output)) / 50.0, **dict(zip(("ax", "ay", "az"), output.T, strict=True)), SCRIPT: 1}
-    )
-    frame.to_csv(tmp_path / "hand.csv", index=False)
-    with tab(browser, bench.address) as one:
-        one.open("/upload")
-        one.page.set_input_files("[data-file]", str(tmp_path / "hand.csv"))
-        one.sees("[data-mapping]")
-        one.page.select_option("select[name=output]", "g")
-        one.page.fill("input[name=serial]", "HAND-1")
-        one.page.fill("input[name=gravity]", "9.80665")
-        one.press("text=Apply")
-        one.sees("[data-reading-problem]")
-        assert "m/s^2" in one.page.inner_text("[data-reading-problem]")
-        one.page.select_option("select[name=output]", "m/s^2")
-        one.press("text=Apply")
-        one.sees("[data-dwells]")
-        assert 12 <= int(one.page.inner_text("[data-dwells]")) <= 14
-        one.press("text=Import it")
-        one.sees("text=Diagnose it")
-        assert one.page.evaluate("() => window.ran") is None
-        assert one.findings() == []
-        assert one.errors == [] == one.outside

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from capture_double import small_job, small_run
-from programmed_lot import keep_state, lot_run, plant_of, programmed
+from programmed_lot import LOT, keep_state, lot_run, plant_of, programmed
 from root_process import ROOT
 from typer.testing import CliRunner
 
@@ -61,7 +61,7 @@ def run(measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
 
 
 def job_of(run: Run) -> Job:
-    return small_job(Path(str(run.archive.root)).parent)
+    return small_job(Path(str(run.archive.root)).parent, *LOT)
 
 
 def copies(run: Run, unit: int = 0) -> list[bytes]:
@@ -353,7 +353,7 @@ def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     ledger.revoke("A1", WRITING, day=today())  # a writing of this run began once and was not completed
-    other = small_run(Path(str(run.archive.root)).parent, None, change)
+    other = small_run(Path(str(run.archive.root)).parent, None, *LOT, change)
     certify(ledger, other, ["A1"])
     words = rf"certificate A1/3 is of run {re.escape(other.id)}.*not after it; write that run"
     with pytest.raises(WrongUse, match=words):

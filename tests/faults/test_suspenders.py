@@ -2,6 +2,7 @@
 
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 from small_station import QUIET, MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
 from pipelines.capture.capture import capture
@@ -127,7 +128,7 @@ def test_soaks_tell_how_far_they_went_beyond():
     assert 0.0 <= soaks[1]["device_overshoot_K"] < soaks[1]["air_overshoot_K"]
 
 
-@pytest.mark.parametrize("records", [1, 2])
+@pytest.mark.parametrize("records", mostly_slow([1, 2], 1))
 def test_a_run_killed_around_a_pause_goes_on_bit_for_bit(records):
     fault = DISTURBANCES["door"]
     whole, reasons = run(fault)
