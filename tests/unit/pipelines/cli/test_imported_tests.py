@@ -90,8 +90,7 @@ def test_a_pulse_before_the_largest_lies_in_its_baseline_and_leaves_no_figure(tm
     assert "another pulse lies before the largest, in its baseline" in text
 
 
-@pytest.mark.parametrize("share", [0.78, 0.93])
-@pytest.mark.parametrize("what", ["the output", "the reference"])
+@pytest.mark.parametrize(("what", "share"), [("the output", 0.93), ("the reference", 0.78)])
 def test_a_flat_top_is_told_without_a_full_scale(what: str, share: float, tmp_path: Path) -> None:
     reference, output = half_sine(), SCALE * felt(half_sine())
     if what == "the output":
@@ -107,7 +106,7 @@ def test_two_neighbours_that_depart_together_are_told(tmp_path: Path) -> None:
     assert "a sample that departs alone, at 0.022 s" in text_of(*shock(tmp_path, half_sine(), output), status=1)
 
 
-@pytest.mark.parametrize("levels", [(0.0, 2.0), (2.0, 0.0), (0.0, -2.0)])
+@pytest.mark.parametrize("levels", [(2.0, 0.0), (0.0, -2.0)])
 def test_a_step_has_its_figures_whichever_way_it_goes(levels: tuple[float, float], tmp_path: Path) -> None:
     drive = np.where(TIME >= 0.02, levels[1], levels[0])
     words = step(tmp_path, drive, 0.05 * (levels[0] + felt(drive - levels[0], 900.0, 0.6)))
@@ -117,8 +116,7 @@ def test_a_step_has_its_figures_whichever_way_it_goes(levels: tuple[float, float
     assert abs(overshoot["value"] - true) < 3.0 * overshoot["uncertainty"]
 
 
-@pytest.mark.parametrize("damping", [0.1, 0.3])
-@pytest.mark.parametrize("share", [0.3, 0.6])
+@pytest.mark.parametrize(("damping", "share"), [(0.1, 0.3), (0.3, 0.6)])
 def test_an_overshoot_that_is_cut_off_is_told_and_a_round_one_is_not(
     damping: float, share: float, tmp_path: Path
 ) -> None:
@@ -219,7 +217,7 @@ def test_a_key_of_records_at_rest_or_of_waveforms_is_refused_for_points(tmp_path
 
 def test_waveforms_of_a_sweep_pass_without_the_figures_that_nobody_asked_for(tmp_path: Path) -> None:
     rng, rate = np.random.default_rng(4), 10_000.0
-    t = np.arange(40_000) / rate
+    t = np.arange(15_000) / rate
     fine = signal.resample_poly(0.5 * signal.chirp(t, 5.0, t[-1], 3000.0, method="log"), 10, 1)
     w = 2.0 * np.pi * 800.0
     output = signal.lsim(([w**2], [1.0, 1.2 * w, w**2]), fine, np.arange(fine.size) / (10.0 * rate))[1][::10]

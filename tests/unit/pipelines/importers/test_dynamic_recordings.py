@@ -23,13 +23,13 @@ def second_order(x, natural_hz, damping, rate_hz):
 
 
 def swept(rng):
-    t = np.arange(int(4.0 * RATE_HZ)) / RATE_HZ
+    t = np.arange(int(2.0 * RATE_HZ)) / RATE_HZ
     return 0.5 * signal.chirp(t, 5.0, t[-1], 3000.0, method="log") * signal.windows.tukey(t.size, 0.02)
 
 
 def shaken(rng):
     sos = signal.butter(4, 3000.0, fs=RATE_HZ, output="sos")
-    return 0.5 * signal.sosfilt(sos, rng.standard_normal(int(4.0 * RATE_HZ)))
+    return 0.5 * signal.sosfilt(sos, rng.standard_normal(int(2.0 * RATE_HZ)))
 
 
 def written(path: Path, x, y, rng, noise_V):
@@ -78,7 +78,7 @@ def shocked(path, *, part=None, **columns):
     return import_waveforms([path], "shock", part, "S1", layout, str(path.parent / "archive"))
 
 
-@pytest.mark.parametrize("duration_ms", [0.5, 1.0, 11.0])
+@pytest.mark.parametrize("duration_ms", [0.5, 11.0])
 def test_a_pulse_is_found_by_itself(duration_ms, tmp_path, rng):
     path = shock_file(tmp_path / "drop.csv", rng, duration_s=1e-3 * duration_ms)
     assert "--procedure shock" in inspect([path]).document["command"]

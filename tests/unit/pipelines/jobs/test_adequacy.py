@@ -41,7 +41,7 @@ def _plain() -> pd.DataFrame:
 
 
 def _hidden() -> pd.DataFrame:
-    return lot(np.random.default_rng(32), units=3, hidden=_cubic)
+    return lot(np.random.default_rng(32), units=2, temperatures=(0.0, 50.0), hidden=_cubic)
 
 
 def _knocked() -> pd.DataFrame:
@@ -102,6 +102,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return small_run(tmp_path_factory.mktemp("judged"))
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     place = ("--archive", run.archive.root)
     whole = document_of("diagnose", run.id, *place)
@@ -133,6 +134,7 @@ def test_the_verdict_of_a_run_is_read_from_its_archive(run: Run, monkeypatch: py
     assert listed["verdict"] == row["verdict"] == ("adequate" if document["adequate"] else "not adequate")
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_another_model_of_a_run_has_a_verdict_of_its_own(run: Run) -> None:
     archive = Archive(run.archive.root)
     other = again(

@@ -39,8 +39,8 @@ def recipe_of(**keys: Any) -> Recipe:
     return short_recipe().model_copy(update={"procedures": [part], "soak_min_s": 900.0})
 
 
-def measured(config: StationConfig, recipe: Recipe | None = None) -> tuple[pd.DataFrame, Device]:
-    recipe, lot = recipe or recipe_of(), lot_of(2)
+def measured(config: StationConfig, recipe: Recipe | None = None, units: int = 2) -> tuple[pd.DataFrame, Device]:
+    recipe, lot = recipe or recipe_of(), lot_of(units)
     sink = captured(recipe, lot, config, roles=roles_of(recipe))
     records, device = procedure_records(recipe, sink)
     return EXPOSURE.reduce(parts_of(recipe)[0], records, device), device
@@ -53,6 +53,7 @@ def outcome(points: pd.DataFrame, device: Device, recipe: Recipe | None = None) 
     return made
 
 
+@pytest.mark.slow
 def test_play_in_the_package_is_a_shift_of_the_bias_and_of_no_scale() -> None:
     play = Hidden(kind="hysteresis_play", figures={"width": WIDTH_K, "gain": GAIN})
     found = outcome(*measured(station_of(preset_overrides=CALM, hidden=[play.model_dump()])))
@@ -155,7 +156,7 @@ def warmer(
 )
 def test_a_difference_of_temperature_is_no_shift(bias_ug_K: float, scale_ppm_K: float, curved: float) -> None:
     rng = np.random.default_rng(3)
-    for _ in range(20):
+    for _ in range(6):
         made = warmer(rng, bias_ug_K=bias_ug_K, scale_ppm_K=scale_ppm_K, curved=curved, apart_K=0.5)
         for one in made.figures["U1"][:2]:
             assert abs(one.value) < 4.0 * one.uncertainty
@@ -177,9 +178,9 @@ def exposed(profile: str, hidden: Hidden, **keys: Any) -> tuple[Outcome, pd.Data
         update={"procedures": [{"kind": "exposure", "scale": 256000.0, "profile": profile, **keys}]}
     )
     config = station_of(preset_overrides=CALM, hidden=[hidden.model_dump()], slot_lag_s=(LAG_S, LAG_S))
-    points, device = measured(config, recipe)
+    points, device = measured(config, recipe, 1)
     effect: Any = hidden_effect(hidden.kind, hidden.figures)
-    effect.begin(2, stream(lot_of(2).seed, "hidden", 0))
+    effect.begin(1, stream(lot_of(1).seed, "hidden", 0))
     return outcome(points, device, recipe), points, effect._sign
 
 
