@@ -55,6 +55,8 @@ def test_one_file_of_a_sweep_or_of_random_vibration_is_recognised_and_identified
     for name, true in (("sweep_natural_hz", 800.0), ("sweep_damping", 0.6)):
         assert figures[name]["identified"]
         assert abs(figures[name]["value"] - true) < max(2.0 * figures[name]["uncertainty"], 0.005 * true)
+    assert "a flatness belongs to a band; set flat_to_hz" in figures["sweep_flatness_percent"]["note"]
+    assert "no static scale and no nominal_scale" in figures["sweep_sensitivity_percent"]["note"]
 
 
 def half_sine(peak_g, duration_s, rng, rate_hz=50_000.0):

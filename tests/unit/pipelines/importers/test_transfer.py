@@ -8,7 +8,6 @@ from each import each
 from in_process import document_of
 from scipy import signal
 
-from pipelines.archive import Archive
 from pipelines.importers.transfer import import_transfer
 from schemas.errors import DataRejected
 
@@ -29,15 +28,6 @@ def written(path: Path, *, low_pass_hz: float = 0.0, top: float = 5000.0, seed: 
     rows = "\n".join(f"{a:.9g},{b:.9g},{c:.9g},0.2,0.15" for a, b, c in zip(f, size, phase, strict=True))
     path.write_text(f"{HEAD}\n{rows}\n")
     return path
-
-
-def test_a_right_model_is_adequate_and_kept(tmp_path: Path) -> None:
-    diagnosis = import_transfer(written(tmp_path / "a.csv"), "S1", archive=str(tmp_path / "archive"))
-    assert diagnosis["adequate"] is True
-    assert diagnosis["parameters"]["natural_hz"]["value"] == pytest.approx(2500.0, rel=0.01)
-    run = Archive(str(tmp_path / "archive")).run(diagnosis["run"])
-    assert len(run.table("procedure_points")) == 30
-    assert run.about["source"]["sha256"]
 
 
 def test_the_missing_pole_is_named_the_error_falls_and_the_command_says_so_by_its_status(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ CASES = [(_plain, True), (_hidden, False), (_knocked, False), (_few, None), (_sw
 @pytest.mark.usefixtures("no_next_measurement")
 @pytest.mark.parametrize(
     ("made", "adequate"),
-    mostly_slow(CASES, *CASES[:2], *CASES[3:5]),
+    mostly_slow(CASES, CASES[1], *CASES[3:5]),  # exchanged axes of one unit are left out of the plain lot
     ids=lambda value: getattr(value, "__name__", str(value)),
 )
 def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:

@@ -66,6 +66,7 @@ def test_play_in_the_package_is_a_shift_of_the_bias_and_of_no_scale() -> None:
         assert abs(scale.value) < 4.0 * scale.uncertainty
 
 
+@pytest.mark.slow
 def test_a_device_that_keeps_nothing_has_no_shift_beyond_u() -> None:
     points, device = measured(station_of(preset_overrides=CALM))
     for figures in outcome(points, device).figures.values():
@@ -224,6 +225,10 @@ def test_adhesive_yields_in_shocks_of_cold_and_not_in_slow_cycles(profile: str) 
         legs = points[points["series"] == "leg"]
         assert (legs["reached_C"] - legs["ordered_C"]).abs().max() < 0.5
         assert made.findings[-1].text.startswith(f"{profile}: 3 legs, air at their ends within")
+        before, device = points[points["series"] == "before"], Device({}, {}, 10.0, "g")
+        assert {one.note for one in outcome(before, device).figures["U000"]} == {
+            "exposure: no records after it, both are needed; check the unit and its seat"
+        }
 
 
 @pytest.mark.slow

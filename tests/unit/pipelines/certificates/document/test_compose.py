@@ -15,7 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from capture_double import small_run
+from capture_double import AT_ROOM, small_run
 from in_process import document_of, refused
 from in_process import text_of as printed
 from laboratory import LABORATORY, laboratory_file
@@ -240,7 +240,7 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
     first = small_run(tmp_path)
     first.seal()
     certify(Ledger(first.archive), first, ["A1"])
-    second = small_run(tmp_path, None, ('"small"', '"later"'))
+    second = small_run(tmp_path, None, ('"small"', '"later"'), *AT_ROOM)
     # the earlier certificate was given for coefficients of a device that has moved since: here the table's bias is moved
     table = first.table("coefficients")
     second.seal()
@@ -248,7 +248,7 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
     known = Ledger(first.archive).calibrations("A1")
     c = compose(second, known[-1], known, LaboratoryFile.model_validate(tomllib.loads(LABORATORY)))
     assert c.adjustment.earlier == "A1/1"
-    assert c.adjustment.dwells == 4
+    assert c.adjustment.dwells == 2
     dwells = second.table("dwells").query("unit == 'A1' and kind == 'verification'")
     own = {(r.axis, r.effect, r.name): r.value for r in table.query("unit == 'A1'").itertuples()}
     errors = []

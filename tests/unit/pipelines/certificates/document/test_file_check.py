@@ -11,7 +11,7 @@ from io import BytesIO
 from pathlib import Path
 
 import pytest
-from capture_double import small_run
+from capture_double import AT_ROOM, small_run
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, utils
@@ -426,7 +426,7 @@ def test_a_certificate_superseded_by_a_later_run_is_told_and_the_later_one_stays
     issued: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(str(issued.run.archive.root), tmp_path / "archive")
-    later, who = small_run(tmp_path, None, ("seed = 5", "seed = 6")), laboratory_file(tmp_path)
+    later, who = small_run(tmp_path, None, ("seed = 5", "seed = 6"), *AT_ROOM), laboratory_file(tmp_path)
     later.seal()
     assert later.id != issued.run.id
     now, ledger = datetime.now(tz=UTC).date(), Ledger(later.archive)
