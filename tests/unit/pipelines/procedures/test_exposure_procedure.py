@@ -173,15 +173,15 @@ def test_without_temperatures_nothing_is_corrected_and_a_finding_says_so() -> No
     ]
 
 
-def exposed(profile: str, hidden: Hidden, **keys: Any) -> tuple[Outcome, pd.DataFrame, Array]:
+def exposed(profile: str, hidden: Hidden, units: int = 2, **keys: Any) -> tuple[Outcome, pd.DataFrame, Array]:
     """What is found of a lot with a hidden effect of its package, its points, and the senses of the effect, (units, 3)."""
     recipe = recipe_of().model_copy(
         update={"procedures": [{"kind": "exposure", "scale": 256000.0, "profile": profile, **keys}]}
     )
     config = station_of(preset_overrides=CALM, hidden=[hidden.model_dump()], slot_lag_s=(LAG_S, LAG_S))
-    points, device = measured(config, recipe, 1)
+    points, device = measured(config, recipe, units)
     effect: Any = hidden_effect(hidden.kind, hidden.figures)
-    effect.begin(1, stream(lot_of(1).seed, "hidden", 0))
+    effect.begin(units, stream(lot_of(units).seed, "hidden", 0))
     return outcome(points, device, recipe), points, effect._sign
 
 
@@ -216,7 +216,7 @@ def largest_lag(change_K: float, over_s: float) -> float:
 def test_adhesive_yields_in_shocks_of_cold_and_not_in_slow_cycles(profile: str) -> None:
     shock = profile != "temperature_variation"
     hidden = Hidden(kind="yielding_adhesive", figures={"gain": 100e-6, "scale": 50e-6})
-    made, points, sign = exposed(profile, hidden, low_C=-40.0, high_C=85.0, cycles=1)
+    made, points, sign = exposed(profile, hidden, 1, low_C=-40.0, high_C=85.0, cycles=1)
     # the fall from the heat to the temperature of the test, in the recovery, is smaller than the first and changes nothing
     flowed = 20.0 + largest_lag(-40.0 - 25.0, 60.0) - 30.0 if shock else 0.0
     agrees(made, BIAS, 100.0 * flowed * sign, 0.08)
