@@ -38,11 +38,6 @@ def test_several_workers_are_other_processes_and_keep_the_order() -> None:
 
 
 @pytest.mark.slow
-def test_a_local_cluster_of_processes_gives_the_same_results(tmp_path) -> None:
-    assert map_partitions(square, list(range(5)), on_dask("local", 2, tmp_path)) == [0, 1, 4, 9, 16]
-
-
-@pytest.mark.slow
 def test_a_cluster_at_an_address_gives_the_same_results(tmp_path) -> None:
     from distributed import LocalCluster
 

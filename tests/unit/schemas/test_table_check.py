@@ -79,7 +79,7 @@ def test_rows_said_to_be_different_are(rows: list[tuple[str, int, float, bool]])
 ODD = st.sampled_from(["A1", "", "x", "w"])
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(
     st.lists(st.tuples(ODD, ODD, st.integers(-1, 3), st.sampled_from([0.0, 1.5, float("nan")])), min_size=1, max_size=6)
 )

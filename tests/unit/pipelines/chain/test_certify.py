@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from capture_double import small_run
+from capture_double import BRIEF, small_run
 from each import each
 from ledger_events import day
 from typed_commands import printed_commands
@@ -25,10 +25,7 @@ from pipelines.chain import certifiable
 from pipelines.chain import certify as certifying
 from pipelines.chain.certifiable import refuse_unstated
 from pipelines.chain.certify import certify, offered
-from pipelines.chain.chain import ORDER
-from pipelines.chain.runner import Runner
 from pipelines.cli import app
-from pipelines.jobs.job import job_of_run
 from pipelines.jobs.model_change import change_from_options
 from pipelines.rerun.rerun import again
 from pipelines.stages.figures import UNITS
@@ -210,18 +207,6 @@ def test_the_limits_file_says_how_long_within_bounds_and_stays_out_of_the_name_o
     assert "validity_months" not in plain.model_dump(mode="json")
 
 
-def test_a_fit_of_archived_data_has_the_date_of_the_measurement(run: Run) -> None:
-    start = "2020-02-03T04:05:06.000+00:00"
-    about = {**run.about, "when": start}
-    (run.path / "run.json").write_bytes(files.json_bytes(about))
-    runner = Runner(job_of_run(run, effects=[*run.about["recipe"]["effects"], "second_order"]), run.archive)
-    for stage in ORDER[:-1]:
-        runner.stage(stage)
-    assert runner.run.id != run.id
-    assert measured_span(runner.run) is None
-    assert measured_on(runner.run) == "2020-02-03"
-
-
 def test_a_fit_by_an_older_version_has_the_date_of_its_capture(run: Run) -> None:
     assert run.records is not None
     happened = Event(kind="soak", time_s=0.0, record=0, reason="25 °C", action="settled")
@@ -321,7 +306,7 @@ def test_a_run_of_a_station_with_another_key_is_certified_where_that_key_is_trus
     from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat, load_pem_private_key
 
     monkeypatch.setenv(VARIABLE, str(keys["foreign"]))
-    run, pem = small_run(tmp_path), tmp_path / "station.pem"
+    run, pem = small_run(tmp_path, None, *BRIEF), tmp_path / "station.pem"
     run.seal()
     public = load_pem_private_key(keys["foreign"].read_bytes(), None).public_key()
     pem.write_bytes(public.public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo))

@@ -23,7 +23,7 @@ STATION = World(units=3, hidden=(("level_error", 3.0),))
 @pytest.mark.parametrize(
     ("world", "scope", "name"),
     [
-        (STATION, "station", "level_error"),
+        pytest.param(STATION, "station", "level_error", marks=pytest.mark.slow),
         (replace(FAULTS["pose_0.1deg"], units=3), "data", "wrong_pose"),
         pytest.param(replace(FAULTS["slip_0.2mrad"], units=3), "data", "table_slip", marks=pytest.mark.slow),
     ],

@@ -174,10 +174,10 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     from pipelines.audit.parameters import NAMES
     from pipelines.discovery import coefficient_populations
 
-    units = 400
+    units = 200
     rng = np.random.default_rng(3)
     values = rng.standard_normal((units, len(NAMES)))
-    values[:60, NAMES.index("bias_y")] += 5.0
+    values[:30, NAMES.index("bias_y")] += 5.0
     every = Calibrations(
         run=np.array([f"r{k}" for k in range(units)], dtype=object),
         unit=np.array([f"U{k}" for k in range(units)], dtype=object),

@@ -38,7 +38,7 @@ def resonant(f: Any, natural: float = 4000.0, quality: float = 30.0, pole: float
     return 1.0 / (1.0 - r**2 + 1j * r / quality) / (1.0 + 1j * f / pole)
 
 
-F = np.geomspace(20.0, 9000.0, 45)
+F = np.geomspace(20.0, 9000.0, 24)
 
 
 def test_sensitivity_is_that_at_the_reference_frequency_with_its_sign_and_the_resonance_is_stated() -> None:
@@ -72,8 +72,8 @@ def test_of_a_sweep_in_several_states_the_one_at_room_temperature_in_the_room_is
     thin = points(F, 1.2 * resonant(F)).assign(pressure_hPa=300.0)
     room = points(F, resonant(F))
     one, _ = swept_axis("SN7", pd.concat([warm, thin, room], ignore_index=True), 2)
-    alone, _ = swept_axis("SN7", room, 2)
-    assert one.sensitivity == alone.sensitivity
+    at = F[np.argmin(np.abs(np.log(F / 160.0)))]
+    assert one.sensitivity == pytest.approx(SCALE * abs(resonant(at)) / G, rel=4e-3)
     with pytest.raises(WrongUse, match="has 0 points of a sweep at 15 to 30 °C in the air of the room, 8 are needed"):
         swept_axis("SN7", warm, 2)
 

@@ -1,5 +1,6 @@
 """Bags of ROS 2 as another program writes them: topics, the clock of the headers, and what is refused with a remedy."""
 
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -15,9 +16,11 @@ IMU = "sensor_msgs/msg/Imu"
 START = 1_700_000_000_000_000_000
 
 
-def bag(folder: Path) -> Path:
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The .db3 of a bag with an accelerometer and a text topic; the headers' clock is 5 ms before that of the recorder."""
     pytest.importorskip("rosbags")
+    folder = tmp_path_factory.mktemp("bags")
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -41,8 +44,10 @@ def bag(folder: Path) -> Path:
     return next((folder / "bag").glob("*.db3"))
 
 
-def test_a_topic_is_read_with_the_clock_of_its_headers_also_with_a_journal_beside_the_bag(tmp_path: Path) -> None:
-    path = bag(tmp_path)
+def test_a_topic_is_read_with_the_clock_of_its_headers_also_with_a_journal_beside_the_bag(
+    bag: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(bag, tmp_path))
     with pytest.raises(WrongUse, match=r"2 groups .*'/imu/data' \(200 samples\), '/told' \(1 samples\)"):
         files.read_content(path)
     content, source = files.read_content(path, "/imu/data")
@@ -65,8 +70,8 @@ CHANGES = {
 
 
 @each(CHANGES)
-def test_a_bag_that_cannot_be_read_is_refused_with_what_to_do(change: str, tmp_path: Path) -> None:
-    path = bag(tmp_path)
+def test_a_bag_that_cannot_be_read_is_refused_with_what_to_do(change: str, bag: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(bag, tmp_path))
     with closing(sqlite3.connect(path)) as database:
         database.execute(change)
         database.commit()

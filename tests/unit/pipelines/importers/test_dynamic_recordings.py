@@ -23,13 +23,13 @@ def second_order(x, natural_hz, damping, rate_hz):
 
 
 def swept(rng):
-    t = np.arange(int(4.0 * RATE_HZ)) / RATE_HZ
+    t = np.arange(int(2.0 * RATE_HZ)) / RATE_HZ
     return 0.5 * signal.chirp(t, 5.0, t[-1], 3000.0, method="log") * signal.windows.tukey(t.size, 0.02)
 
 
 def shaken(rng):
     sos = signal.butter(4, 3000.0, fs=RATE_HZ, output="sos")
-    return 0.5 * signal.sosfilt(sos, rng.standard_normal(int(4.0 * RATE_HZ)))
+    return 0.5 * signal.sosfilt(sos, rng.standard_normal(int(2.0 * RATE_HZ)))
 
 
 def written(path: Path, x, y, rng, noise_V):
@@ -55,6 +55,8 @@ def test_one_file_of_a_sweep_or_of_random_vibration_is_recognised_and_identified
     for name, true in (("sweep_natural_hz", 800.0), ("sweep_damping", 0.6)):
         assert figures[name]["identified"]
         assert abs(figures[name]["value"] - true) < max(2.0 * figures[name]["uncertainty"], 0.005 * true)
+    assert "a flatness belongs to a band; set flat_to_hz" in figures["sweep_flatness_percent"]["note"]
+    assert "no static scale and no nominal_scale" in figures["sweep_sensitivity_percent"]["note"]
 
 
 def half_sine(peak_g, duration_s, rng, rate_hz=50_000.0):
@@ -78,7 +80,7 @@ def shocked(path, *, part=None, **columns):
     return import_waveforms([path], "shock", part, "S1", layout, str(path.parent / "archive"))
 
 
-@pytest.mark.parametrize("duration_ms", [0.5, 1.0, 11.0])
+@pytest.mark.parametrize("duration_ms", [0.5, 11.0])
 def test_a_pulse_is_found_by_itself(duration_ms, tmp_path, rng):
     path = shock_file(tmp_path / "drop.csv", rng, duration_s=1e-3 * duration_ms)
     assert "--procedure shock" in inspect([path]).document["command"]

@@ -266,6 +266,11 @@ def test_the_three_columns_their_unit_and_the_clock_are_recognised(
     assert seen.guessed.time_unit.meaning == time
     assert seen.guessed.dwells is positions
     assert [text for text in seen.open if not text.startswith("the rate of the samples")] == []
+    if write is bursts:  # one record
+        assert seen.gaps == 0
+        assert seen.rate_hz == pytest.approx(8.0 / 0.0135, rel=0.01)
+        assert seen.guessed.column("temperature") == "gtemp"
+    assert seen.gaps == 1 or write is not logger_of_imu
 
 
 @each(SEALED)
@@ -276,14 +281,6 @@ def test_nothing_is_proposed_where_no_three_columns_are_one_accelerometer(
     assert axes_of(seen) == ""
     assert seen.open
     assert "x=COLUMN" in seen.import_command
-
-
-def test_a_clock_that_writes_in_bursts_is_one_record_and_a_pause_is_a_gap(rng: Rng, tmp_path: Path) -> None:
-    burst = recognise([bursts(rng, tmp_path)])
-    assert burst.gaps == 0
-    assert burst.rate_hz == pytest.approx(8.0 / 0.0135, rel=0.01)
-    assert burst.guessed.column("temperature") == "gtemp"
-    assert recognise([logger_of_imu(rng, tmp_path)]).gaps == 1
 
 
 def test_the_reference_and_the_spread_of_a_table_of_means_are_recognised_by_their_names(

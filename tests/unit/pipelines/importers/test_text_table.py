@@ -247,7 +247,7 @@ SERIALS = ("007", "7", "1e5", "100000", "NaN", "NA", "TRUE", "0x1F", "1234567890
 
 @each(["unit", "Part"])
 def test_serial_numbers_stay_as_they_were_written(column: str, tmp_path: Path) -> None:
-    for names in (*[(one,) for one in SERIALS], SERIALS):
+    for names in (("007",), ("1e5",), ("NaN",), SERIALS):
         rows = [f"{name};{k};{k},5;{0.1 * k:.1f};0.2;9.8".replace(".", ",") for name in names for k in range(4)]
         (tmp_path / "a.csv").write_text("\n".join([f"{column};no;t;x;y;z", *rows]) + "\n")
         found = files.read_content(tmp_path / "a.csv")[0]

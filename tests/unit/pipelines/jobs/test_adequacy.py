@@ -41,7 +41,7 @@ def _plain() -> pd.DataFrame:
 
 
 def _hidden() -> pd.DataFrame:
-    return lot(np.random.default_rng(32), units=3, hidden=_cubic)
+    return lot(np.random.default_rng(32), units=2, temperatures=(0.0, 50.0), hidden=_cubic)
 
 
 def _knocked() -> pd.DataFrame:
@@ -74,7 +74,7 @@ CASES = [(_plain, True), (_hidden, False), (_knocked, False), (_few, None), (_sw
 @pytest.mark.usefixtures("no_next_measurement")
 @pytest.mark.parametrize(
     ("made", "adequate"),
-    mostly_slow(CASES, *CASES[:2], *CASES[3:5]),
+    mostly_slow(CASES, CASES[1], *CASES[3:5]),  # exchanged axes of one unit are left out of the plain lot
     ids=lambda value: getattr(value, "__name__", str(value)),
 )
 def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:
@@ -102,6 +102,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return small_run(tmp_path_factory.mktemp("judged"))
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     place = ("--archive", run.archive.root)
     whole = document_of("diagnose", run.id, *place)
@@ -133,6 +134,7 @@ def test_the_verdict_of_a_run_is_read_from_its_archive(run: Run, monkeypatch: py
     assert listed["verdict"] == row["verdict"] == ("adequate" if document["adequate"] else "not adequate")
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_another_model_of_a_run_has_a_verdict_of_its_own(run: Run) -> None:
     archive = Archive(run.archive.root)
     other = again(

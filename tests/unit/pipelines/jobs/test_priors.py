@@ -1,5 +1,6 @@
 """The family of a recipe's device, from an archive: which calibrations count, what is refused, and what a run keeps of it."""
 
+import shutil
 from datetime import date
 from pathlib import Path
 
@@ -26,9 +27,16 @@ def recipe(tmp_path: Path) -> Recipe:
     return load_recipe(recipe_file(tmp_path, *BRIEF)).model_copy(update={"prior": PriorTerms()})
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Archive:
+    folder = tmp_path_factory.mktemp("family")
+    return family_archive(folder / "archive", recipe_file(folder, *BRIEF), SPREAD)
+
+
 @pytest.fixture
-def archive(tmp_path: Path) -> Archive:
-    return family_archive(tmp_path / "archive", recipe_file(tmp_path, *BRIEF), SPREAD)
+def archive(made: Archive, tmp_path: Path) -> Archive:
+    shutil.copytree(str(made.root), tmp_path / "archive")
+    return Archive(tmp_path / "archive")
 
 
 def test_the_family_is_that_of_the_archive_without_the_units_of_the_lot_and_a_plan_has_its_precision_in_g(

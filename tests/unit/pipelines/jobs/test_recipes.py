@@ -128,11 +128,7 @@ PRIOR = StoredFamily(
 
 @pytest.mark.parametrize(
     ("own", "names"),
-    [
-        ("", 1),
-        ("[stop]\nbias_ug = 900.0\n", 6),
-        ("[stop]\nbias_ug = 900.0\n[certificate]\nvalidity_months = 6\n", 6),
-    ],
+    [("", 1), ("[stop]\nbias_ug = 900.0\n", 6), ("[stop]\nbias_ug = 900.0\n[certificate]\nvalidity_months = 6\n", 6)],
 )
 def test_a_capture_that_may_end_is_named_by_all_that_a_look_decides_by(tmp_path: Path, own: str, names: int) -> None:
     """What a budget rests on changes what is known, and nothing of a capture that takes every dwell."""

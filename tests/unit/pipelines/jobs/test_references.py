@@ -43,10 +43,10 @@ class TurnedTable(CaptureDouble):
         return super().output(slot, turned, temperature, shape, rng)
 
 
-def run_of(folder: Path, urad: float, *changes: tuple[str, str]) -> Run:
+def run_of(folder: Path, urad: float) -> Run:
     table = TurnedTable()
     table.urad = urad
-    job = small_job(folder, ("9.8123", "9.80665"), *changes, station=WORKSHOP)
+    job = small_job(folder, ("9.8123", "9.80665"), station=WORKSHOP)
     return measured_run(job, Archive(folder / "archive"), table)
 
 
@@ -144,9 +144,11 @@ def test_a_contradicted_run_is_not_certified_and_a_weaker_finding_stands_in_the_
     assert certifiable.refuse_contradicted(run) == contradiction(judged)
 
 
-def test_one_unit_alone_cannot_be_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, "")
-    judged = references_of(run_of(tmp_path, 200.0, ('"A1", "A2", "A3"', '"A1"')))
+def test_one_unit_alone_cannot_be_judged(runs: dict[float, Run], monkeypatch: pytest.MonkeyPatch) -> None:
+    read = Run.table
+    monkeypatch.setattr(Run, "table", lambda own, name: read(own, name).query("unit == 'A1'"))
+    monkeypatch.setattr("pipelines.jobs.references._judged", {})
+    judged = references_of(runs[200.0])
     assert judged["worse"] is None
     assert "one unit alone" in str(judged["reason"])
     assert unseen(judged) == "it shows nothing of the table"

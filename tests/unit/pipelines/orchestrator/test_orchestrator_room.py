@@ -38,15 +38,16 @@ TAKEN = [
 ]
 
 
-@pytest.mark.parametrize("address", KEPT)
+@each(KEPT)
 def test_an_address_without_credentials_stays_as_it_is(address: str) -> None:
     assert without_credentials(address) == address
     refuse_credentials(address)
     assert not credentials_in(f'{{"archive": "{address}"}}')
 
 
-@pytest.mark.parametrize(("address", "left"), TAKEN)
-def test_credentials_are_taken_out_and_refused(address: str, left: str) -> None:
+@each(TAKEN)
+def test_credentials_are_taken_out_and_refused(row: tuple[str, str]) -> None:
+    address, left = row
     assert without_credentials(address) == left
     assert credentials_in(f'{{"parameters": {{"archive": "{address}", "recipe": "x"}}}}')
     with pytest.raises(WrongUse, match="a parameter of a flow is an address with credentials") as told:
@@ -112,7 +113,7 @@ def test_the_deployments_of_the_product_state_a_policy() -> None:
     assert policies["weekly-audit"].missed == "latest"
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def collector():
     """The collector of the process of the tests, put back."""
     before = gc.isenabled()
@@ -121,6 +122,7 @@ def collector():
     gc.enable() if before else gc.disable()
 
 
+@pytest.mark.usefixtures("collector")
 def test_nothing_is_searched_in_the_block_or_later_of_what_it_made_and_the_collector_is_as_before() -> None:
     gc.enable()
     before = gc.get_freeze_count()

@@ -10,15 +10,7 @@ from spun_centrifuge import spins, spun
 
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.figures import FigureValue
-from pipelines.procedures.recorded import (
-    REFERENCE,
-    Device,
-    ProcedureRecord,
-    ProcedureStep,
-    Taken,
-    UnitRecord,
-    at_rest,
-)
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureRecord, ProcedureStep, Taken, UnitRecord, at_rest
 
 CENTRIFUGE: Any = PROCEDURES["centrifuge"]
 

@@ -39,8 +39,8 @@ def recipe_of(**keys: Any) -> Recipe:
     return short_recipe().model_copy(update={"procedures": [part], "soak_min_s": 900.0})
 
 
-def measured(config: StationConfig, recipe: Recipe | None = None) -> tuple[pd.DataFrame, Device]:
-    recipe, lot = recipe or recipe_of(), lot_of(2)
+def measured(config: StationConfig, recipe: Recipe | None = None, units: int = 2) -> tuple[pd.DataFrame, Device]:
+    recipe, lot = recipe or recipe_of(), lot_of(units)
     sink = captured(recipe, lot, config, roles=roles_of(recipe))
     records, device = procedure_records(recipe, sink)
     return EXPOSURE.reduce(parts_of(recipe)[0], records, device), device
@@ -53,6 +53,7 @@ def outcome(points: pd.DataFrame, device: Device, recipe: Recipe | None = None) 
     return made
 
 
+@pytest.mark.slow
 def test_play_in_the_package_is_a_shift_of_the_bias_and_of_no_scale() -> None:
     play = Hidden(kind="hysteresis_play", figures={"width": WIDTH_K, "gain": GAIN})
     found = outcome(*measured(station_of(preset_overrides=CALM, hidden=[play.model_dump()])))
@@ -65,6 +66,7 @@ def test_play_in_the_package_is_a_shift_of_the_bias_and_of_no_scale() -> None:
         assert abs(scale.value) < 4.0 * scale.uncertainty
 
 
+@pytest.mark.slow
 def test_a_device_that_keeps_nothing_has_no_shift_beyond_u() -> None:
     points, device = measured(station_of(preset_overrides=CALM))
     for figures in outcome(points, device).figures.values():
@@ -155,7 +157,7 @@ def warmer(
 )
 def test_a_difference_of_temperature_is_no_shift(bias_ug_K: float, scale_ppm_K: float, curved: float) -> None:
     rng = np.random.default_rng(3)
-    for _ in range(20):
+    for _ in range(6):
         made = warmer(rng, bias_ug_K=bias_ug_K, scale_ppm_K=scale_ppm_K, curved=curved, apart_K=0.5)
         for one in made.figures["U1"][:2]:
             assert abs(one.value) < 4.0 * one.uncertainty
@@ -171,15 +173,15 @@ def test_without_temperatures_nothing_is_corrected_and_a_finding_says_so() -> No
     ]
 
 
-def exposed(profile: str, hidden: Hidden, **keys: Any) -> tuple[Outcome, pd.DataFrame, Array]:
+def exposed(profile: str, hidden: Hidden, units: int = 2, **keys: Any) -> tuple[Outcome, pd.DataFrame, Array]:
     """What is found of a lot with a hidden effect of its package, its points, and the senses of the effect, (units, 3)."""
     recipe = recipe_of().model_copy(
         update={"procedures": [{"kind": "exposure", "scale": 256000.0, "profile": profile, **keys}]}
     )
     config = station_of(preset_overrides=CALM, hidden=[hidden.model_dump()], slot_lag_s=(LAG_S, LAG_S))
-    points, device = measured(config, recipe)
+    points, device = measured(config, recipe, units)
     effect: Any = hidden_effect(hidden.kind, hidden.figures)
-    effect.begin(2, stream(lot_of(2).seed, "hidden", 0))
+    effect.begin(units, stream(lot_of(units).seed, "hidden", 0))
     return outcome(points, device, recipe), points, effect._sign
 
 
@@ -214,7 +216,7 @@ def largest_lag(change_K: float, over_s: float) -> float:
 def test_adhesive_yields_in_shocks_of_cold_and_not_in_slow_cycles(profile: str) -> None:
     shock = profile != "temperature_variation"
     hidden = Hidden(kind="yielding_adhesive", figures={"gain": 100e-6, "scale": 50e-6})
-    made, points, sign = exposed(profile, hidden, low_C=-40.0, high_C=85.0, cycles=1)
+    made, points, sign = exposed(profile, hidden, 1, low_C=-40.0, high_C=85.0, cycles=1)
     # the fall from the heat to the temperature of the test, in the recovery, is smaller than the first and changes nothing
     flowed = 20.0 + largest_lag(-40.0 - 25.0, 60.0) - 30.0 if shock else 0.0
     agrees(made, BIAS, 100.0 * flowed * sign, 0.08)
@@ -223,6 +225,10 @@ def test_adhesive_yields_in_shocks_of_cold_and_not_in_slow_cycles(profile: str) 
         legs = points[points["series"] == "leg"]
         assert (legs["reached_C"] - legs["ordered_C"]).abs().max() < 0.5
         assert made.findings[-1].text.startswith(f"{profile}: 3 legs, air at their ends within")
+        before, device = points[points["series"] == "before"], Device({}, {}, 10.0, "g")
+        assert {one.note for one in outcome(before, device).figures["U000"]} == {
+            "exposure: no records after it, both are needed; check the unit and its seat"
+        }
 
 
 @pytest.mark.slow

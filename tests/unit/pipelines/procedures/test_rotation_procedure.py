@@ -26,7 +26,7 @@ from stations.plant.turning import places
 
 SCALE = 256000.0  # of an ADXL355, LSB per g
 ROTATION: Any = PROCEDURES["rotation"]
-LOT = lot_of(2)
+LOT = lot_of(1)
 Measured = tuple[pd.DataFrame, Outcome, MemorySink]
 
 

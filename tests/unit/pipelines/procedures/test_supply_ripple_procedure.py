@@ -26,7 +26,7 @@ def recipe_of(device: str, scale: float, **keys: Any) -> Recipe:
 
 
 def outcome(device: str, scale: float, **keys: Any) -> tuple[Outcome, pd.DataFrame]:
-    recipe, lot = recipe_of(device, scale, **keys), lot_of(2, device)
+    recipe, lot = recipe_of(device, scale, **keys), lot_of(1, device)
     sink = captured(recipe, lot, station_of(), roles=roles_of(recipe))
     (part,), (records, made) = parts_of(recipe), procedure_records(recipe, sink)
     points = RIPPLE.reduce(part, records, made)
@@ -41,7 +41,7 @@ def by_name(figures: list[FigureValue]) -> dict[str, FigureValue]:
 
 def test_the_rejection_of_an_output_in_volts_is_that_of_its_regulator_and_its_output_stage() -> None:
     made, points = outcome("SF1500", 0.007)
-    devices = plant_of(station_of(), lot_of(2, "SF1500")).physics.devices
+    devices = plant_of(station_of(), lot_of(1, "SF1500")).physics.devices
     for k, figures in enumerate(made.figures.values()):
         felt = [0.007 * SHIFT_G * abs(devices.ripple_response(hertz)[k]) / 12.0 for hertz in FREQUENCIES]
         true = -20.0 * np.log10(max(felt))  # output in V over ripple in V, of the worst frequency
@@ -56,7 +56,7 @@ def test_the_rejection_of_an_output_in_volts_is_that_of_its_regulator_and_its_ou
 
 def test_a_digital_output_has_micro_g_per_volt_and_no_decibels() -> None:
     made, _ = outcome("ADXL355", 256000.0, ripple_V=0.3)
-    devices = plant_of(station_of(), lot_of(2)).physics.devices
+    devices = plant_of(station_of(), lot_of(1)).physics.devices
     for k, figures in enumerate(made.figures.values()):
         found = by_name(figures)
         assert "a voltage is needed" in found["ripple_rejection_dB"].note

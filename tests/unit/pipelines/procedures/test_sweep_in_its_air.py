@@ -20,7 +20,7 @@ from stations.plant.hidden.spring import AIR_K, AIR_UPAS, GasFilm
 SWEEP: Any = PROCEDURES["sweep"]
 MODEL = ["second_order", "two_pole", "delay"]
 PART = {
-    "kind": "sweep", "nominal_scale": 0.007, "low_hz": 100.0, "high_hz": 6000.0, "per_octave": 3, "level_g": 2.0,
+    "kind": "sweep", "nominal_scale": 0.007, "low_hz": 100.0, "high_hz": 6000.0, "per_octave": 2, "level_g": 2.0,
     "record_s": 0.1, "effects": MODEL,
 }  # fmt: skip
 
@@ -71,12 +71,12 @@ def test_a_vented_film_is_recognised_by_the_pressure() -> None:
 
 
 def test_units_whose_air_changes_nothing_have_an_adequate_model() -> None:
-    found = judged(swept(None, pressures_hPa=[300.0], **WARM))
+    found = judged(swept(None, pressures_hPa=[300.0], other_temperatures_C=[85.0]))
     assert found.adequate is True
 
 
 def test_effects_of_the_air_are_candidates_only_where_it_changes() -> None:
-    still = transfer_points(swept(None, low_hz=200.0, per_octave=2))
+    still = transfer_points(swept(None, low_hz=200.0))
     effects = ("gas_damping", "natural_temperature", "gas_pressure")
     assert not any(EFFECTS[name].seen(still.conditions) for name in effects)
 

@@ -34,7 +34,7 @@ def first_of(hidden: str) -> EffectView:
     ("hidden", "quantity"),
     [
         ("third_order", r"specific force along [xyz] / g"),
-        ("cross_coupling", r"f[xyz]·f[xyz] / g²|the contribution of .*"),
+        pytest.param("cross_coupling", r"f[xyz]·f[xyz] / g²|the contribution of .*", marks=pytest.mark.slow),
     ],
 )
 def test_the_residual_is_seen_against_what_the_effect_depends_on(hidden: str, quantity: str) -> None:

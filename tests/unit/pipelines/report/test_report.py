@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from benchmarks.truth import Spec, make_run
 from pipelines.diagnosis.diagnose import examination
@@ -44,9 +45,10 @@ def test_numbers_have_the_digits_of_their_uncertainty_a_sign_and_no_negative_zer
     assert [probability(p) for p in (0.68, 3.2e-12, 0.0)] == ["p = 0.68", "p < 0.001", "p < 0.001"]
 
 
-@pytest.mark.parametrize(
-    ("effect", "first"), [("third_order", "force"), ("encoder_harmonic", "outer_deg"), ("aging_log", "since_power_s")]
-)
+FIRST = [("third_order", "force"), ("encoder_harmonic", "outer_deg"), ("aging_log", "since_power_s")]
+
+
+@pytest.mark.parametrize(("effect", "first"), mostly_slow(FIRST, FIRST[0]))
 def test_the_first_picture_is_the_quantity_of_the_missing_effect(effect: str, first: str) -> None:
     lot = make_run(Spec(effects=(effect,), sizes=(4.0,), units=3), 5)
     made = examination(lot.dwells, lot.history, lot.sealed.spec.base)

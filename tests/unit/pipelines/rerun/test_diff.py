@@ -71,16 +71,18 @@ def test_another_model_is_named_and_changes_stand_against_both_uncertainties(run
 
 
 def test_a_fresh_measurement_differs_by_its_data_and_runs_without_a_common_unit_are_refused(
-    run: Run, tmp_path: Path
+    run: Run, larger: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     archive = Archive(run.archive.root)
     document = diff(run, measured_run(small_job(tmp_path, repeat=1), archive, CaptureDouble(noise_g=2e-4)))
     assert ("data", "") in whats(document)
     assert document["coefficients"]
-    (tmp_path / "other").mkdir()
-    other = small_run(tmp_path / "other", None, ('units = ["A1", "A2", "A3"]', 'units = ["B1", "B2"]'))
-    with pytest.raises(DataRejected, match="no unit in common"):
-        diff(run, other)
+    read = Run.table
+    others = lambda own, name: read(own, name).replace({"unit": {f"A{k}": f"B{k}" for k in (1, 2, 3)}})  # noqa: E731
+    with monkeypatch.context() as patch:
+        patch.setattr(Run, "table", lambda own, name: (read if own is run else others)(own, name))
+        with pytest.raises(DataRejected, match="no unit in common"):
+            diff(run, larger)
 
 
 def test_versions_of_libraries_and_code_are_named(run: Run, larger: Run) -> None:

@@ -1,11 +1,13 @@
 """Other statistics than the Allan deviation: units, coverage of their intervals, where there is none, MTIE against a peer."""
 
 from dataclasses import replace
+from itertools import product
 
 import allantools
 import made_noise as generate
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial.noise.allan import overlapping
 from inertial.noise.mixture import basis
@@ -36,8 +38,10 @@ def evaluated(name: str, records: np.ndarray, unit: str = "g", rate_hz: float = 
     return deviations(STATISTICS[name], records, unit, curve, terms, explained=terms.p_value >= 1e-6)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", ["modified", "hadamard", "total"])
+EVERY = [*product(("modified", "hadamard", "total"), KINDS)]
+
+
+@pytest.mark.parametrize(("name", "kind"), mostly_slow(EVERY, *EVERY[::2]))
 def test_intervals_cover_the_truth_as_often_as_they_say(name: str, kind: str) -> None:
     found = of_noise(name, kind)
     m = np.round(found.tau).astype(np.int64)

@@ -95,7 +95,7 @@ def test_noise_that_grows_is_told_with_its_ratio_on_every_axis() -> None:
 
 
 def test_noise_that_stays_is_told_to_stay() -> None:
-    named = [soak_noise(*run_of(0.0, seed=seed))["noise_temperature"]["verdict"] for seed in range(20, 28)]
+    named = [soak_noise(*run_of(0.0, seed=seed))["noise_temperature"]["verdict"] for seed in range(20, 24)]
     assert pd.concat(named).unique().tolist() == [SAME]
 
 
@@ -111,7 +111,7 @@ ENDS = (-40.0, 80.0)
 
 @pytest.mark.parametrize(
     ("units", "louder"),
-    [(1, {"U0": (1.5, 1.5, 1.5)}), (8, {"U3": (2.0, 2.0, 2.0)}), (2, {"U0": (1.0, 1.0, 2.0), "U1": (1.0, 1.0, 2.0)})],
+    [(1, {"U0": (1.5, 1.5, 1.5)}), (4, {"U3": (2.0, 2.0, 2.0)}), (2, {"U0": (1.0, 1.0, 2.0), "U1": (1.0, 1.0, 2.0)})],
 )
 def test_an_axis_is_judged_by_its_own_ratio(units: int, louder: dict[str, tuple[float, float, float]]) -> None:
     change = soak_noise(*run_of(0.0, 7, units, levels=ENDS, louder=louder))["noise_temperature"]

@@ -38,25 +38,12 @@ def ended(table: Jobs, name: str) -> job_table.BackgroundJob:
     return job
 
 
-def test_two_that_want_the_same_share_a_job_and_a_failure_is_a_sentence(
+def test_a_stopped_job_ends_its_process_and_the_next_one_runs_is_shared_and_fails_with_a_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    table = Jobs(tmp_path / "jobs.json", workers=1)
-    request = {"recipe": str(tmp_path / "none.toml"), "effects": [], "station": "", "archive": str(tmp_path)}
-    first, second = table.submit("plan", "a plan", request), table.submit("plan", "a plan", request)
-    assert first is second
-    job = ended(table, first.id)
-    assert job.state == "failed"
-    assert "none.toml" in job.problem
-    assert table.result("plan", request) is None
-    assert table.submit("plan", "a plan", request).id == first.id  # a failure can be tried again
-    table.close()
     state, text = done_in_process("diagnose", {}, lambda *_: None)  # a defect does not end the process
     assert (state, "defect" in text) == ("failed", True)
     assert "Traceback" in capsys.readouterr().err
-
-
-def test_a_stopped_job_ends_its_process_and_the_next_one_runs(tmp_path: Path) -> None:
     table = Jobs(tmp_path / "jobs.json", workers=1)
     request = {"recipe": "production", "effects": [], "station": "", "archive": str(tmp_path)}
     job = table.submit("plan", "a plan", request)
@@ -65,8 +52,15 @@ def test_a_stopped_job_ends_its_process_and_the_next_one_runs(tmp_path: Path) ->
         assert time.monotonic() < end
         time.sleep(0.01)
     assert table.stop(job.id).state == "stopped"
-    other = table.submit("plan", "another", {**request, "recipe": str(tmp_path / "none.toml")})
-    assert ended(table, other.id).state == "failed"
+    bad = {**request, "recipe": str(tmp_path / "none.toml")}
+    first, second = table.submit("plan", "another", bad), table.submit("plan", "another", bad)
+    assert first is second
+    failed = ended(table, first.id)
+    assert failed.state == "failed"
+    assert "none.toml" in failed.problem
+    assert table.result("plan", bad) is None
+    assert table.submit("plan", "another", bad).id == first.id  # a failure can be tried again
+    ended(table, first.id)
     assert table.get(job.id).state == "stopped"
     assert table.result("plan", request) is None
     table.close()
