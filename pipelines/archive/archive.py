@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,7 @@ from pipelines.archive.run import START, Run, names_in
 from pipelines.archive.signatures import key_file
 from pipelines.archive.store import Place, address_of, path_of
 from schemas.errors import ArchiveUnusable, WrongUse, close_matches, did_you_mean
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,6 +65,7 @@ class Archive:
     def prepare(self) -> None:
         """Make sure that the folder is an archive that can be written; refuse a folder of something else."""
         self._refuse_key_within()
+        self._refuse_name_without_text()
         mark = self.root / "archive.json"
         if mark.is_file():
             self._refuse_other_format()
@@ -180,6 +183,16 @@ class Archive:
         self._refuse_other_format()
         folder = self.root / "runs"
         return sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
+
+    def _refuse_name_without_text(self) -> None:
+        """Refuse a folder whose name has bytes that are no text: the archive's documents hold its address."""
+        try:
+            self.address.encode()
+        except UnicodeEncodeError:
+            raise ArchiveUnusable(
+                f"archive: the name of folder '{shown(self.address)}' is not in the encoding of this system "
+                f"({sys.getfilesystemencoding()}); rename it, or give another one with --archive"
+            ) from None
 
     def _refuse_key_within(self) -> None:
         """Refuse a signing key inside the archive: who can edit the archive could sign with it."""

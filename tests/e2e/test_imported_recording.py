@@ -172,10 +172,14 @@ def test_angles_of_a_table_are_poses_for_a_fit_as_for_a_diagnosis() -> None:
     fitted, of_file = document_of("fit", run, status=0), document_of("diagnose", "table.csv", status=0)
     assert fitted["adequate"] is of_file["adequate"] is True
     assert document_of("diagnose", run)["error"] == pytest.approx(of_file["error"])
+    bare = document_of("import", "table.csv", *words, f"{COLUMNS},{poses}")["run"]
+    by_residuals = document_of("fit", bare, status=0)  # the noise that no samples tell is that of the residuals
+    assert by_residuals["adequate"] is True
+    units = [json.loads(given("export", answer["run"])[1])["units"][0] for answer in (fitted, by_residuals)]
+    np.testing.assert_allclose(units[1]["bias"], units[0]["bias"], atol=2e-5)
     followed = document_of("fit", run, "--effects", f"{PLAIN},covariate:hum", status=0)  # what is recorded besides
     assert followed["adequate"] is True
-    unit = json.loads(given("export", fitted["run"])[1])["units"][0]
-    np.testing.assert_allclose(unit["bias"][0], [0.01, -0.02, 0.03], atol=1e-4)
+    np.testing.assert_allclose(units[0]["bias"][0], [0.01, -0.02, 0.03], atol=1e-4)
 
 
 def test_an_import_that_was_not_fitted_is_advised_and_a_fit_that_fails_leaves_no_run() -> None:

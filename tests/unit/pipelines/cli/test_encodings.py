@@ -2,13 +2,16 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pipelines.cli.printing import print_json
 from schemas.errors import UNUSABLE
 
 
@@ -33,18 +36,37 @@ def test_characters_that_an_encoding_lacks_stop_no_command(record: Path) -> None
     done = command("noise", "allan", str(record), encoding="cp1252")
     assert (done.returncode, done.stderr) == (0, b"")
     assert "g/?Hz" in done.stdout.decode("cp1252")
-    as_json = command("noise", "allan", str(record), "--json", encoding="cp1252")
-    assert json.loads(as_json.stdout.decode("ascii")) == json.loads(
-        command("noise", "allan", str(record), "--json").stdout.decode("utf-8")
-    )
 
 
-def test_a_folder_whose_name_is_no_text_is_refused_in_one_message(tmp_path: Path) -> None:
+def test_a_document_in_another_encoding_is_json_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    written = BytesIO()
+    monkeypatch.setattr(sys, "stdout", TextIOWrapper(written, encoding="cp1252"))
+    print_json({"unit": "g/√Hz", "µ": 1.0})
+    assert json.loads(written.getvalue().decode("ascii")) == {"unit": "g/√Hz", "µ": 1.0}
+
+
+def test_a_folder_or_a_file_whose_name_is_no_text_is_refused_in_one_message(record: Path, tmp_path: Path) -> None:
     if os.name == "nt" or sys.getfilesystemencoding() != "utf-8":
         pytest.skip("names are text here")
-    done = command("run", "--archive", os.fsencode(tmp_path) + b"/\xfc")
-    assert done.returncode == UNUSABLE
-    message = done.stderr.decode().strip()
-    assert message.startswith("tumbleline: ")
-    assert message.endswith("rename it, or set LC_ALL to the encoding of its name")
-    assert "\n" not in message
+    folder, file = os.fsencode(tmp_path) + b"/\xfc", os.fsencode(tmp_path) + b"/\xfc.csv"
+    shutil.copy(record, file)
+    mapped = (
+        "--map",
+        "time=time_s,x=x [g]",
+        "--set",
+        "axes=x",
+        "--units",
+        "S1",
+        "--archive",
+        str(tmp_path / "archive"),
+    )
+    for words, remedy in (
+        (("run", "--archive", folder), "give another one with --archive"),
+        (("import", file, *mapped), "LC_ALL"),
+    ):
+        done = command(*words)
+        assert done.returncode == UNUSABLE
+        message = done.stderr.decode().strip()
+        assert message.startswith("tumbleline: ")
+        assert remedy in message
+        assert "\n" not in message
