@@ -81,9 +81,9 @@ def test_what_the_verdict_rests_on_stands_beside_it() -> None:
 @pytest.mark.slow
 def test_the_smallest_cubic_is_one_that_is_seen_in_about_half_of_the_recordings() -> None:
     smallest = diagnose(make(Recording(60), 21).dwells)["evidence"]["smallest_cubic_ug"]
-    large = [diagnose(make(Recording(60, cubic=2.5 * smallest), 21 + k).dwells)["adequate"] for k in range(2)]
-    small = [diagnose(make(Recording(60, cubic=0.2 * smallest), 31 + k).dwells)["adequate"] for k in range(2)]
-    assert large.count(False) == 2
+    large = [diagnose(make(Recording(60, cubic=2.5 * smallest), 21 + k).dwells)["adequate"] for k in range(3)]
+    small = [diagnose(make(Recording(60, cubic=0.2 * smallest), 31 + k).dwells)["adequate"] for k in range(3)]
+    assert large.count(False) >= 2
     assert small.count(False) <= 1
 
 
@@ -134,6 +134,12 @@ def test_a_warm_up_of_unknown_poses_comes_back_with_its_uncertainty() -> None:
 def test_what_the_norm_does_not_determine_is_refused_by_name(row: tuple[tuple[str, ...], str]) -> None:
     with pytest.raises(DataRejected, match=row[1]):
         norms_fitted(make(Recording(30), 2).dwells, None, row[0])
+
+
+@pytest.mark.slow
+def test_a_drift_after_switching_on_of_eight_times_the_noise_is_named() -> None:
+    document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2300.0), 96_005_004).dwells)
+    assert any("warm_up" in group["effects"] for group in document["classes"])
 
 
 def test_a_memory_that_was_at_rest_has_no_column_for_its_state() -> None:
