@@ -11,7 +11,7 @@ import pandas as pd
 
 from tumbleline.calibrations import Calibration
 from tumbleline.pictures import Picture, as_html, as_text
-from tumbleline.recordings import Recording, Source, read
+from tumbleline.recordings import Recording, Source, listed, read
 
 if TYPE_CHECKING:
     from pipelines.diagnosis.diagnose import Examination
@@ -130,7 +130,7 @@ class ModelDiagnosis(JudgedModel):
 
 def diagnose(
     recording: Recording | Source | Sequence[str | Path],
-    model: Calibration | Sequence[str] | None = None,
+    model: Calibration | Sequence[str] | str | None = None,
     *,
     leave_out: Sequence[str] = (),
 ) -> ModelDiagnosis:
@@ -143,11 +143,16 @@ def diagnose(
     leave_out : dwells as ``UNIT:DWELL``
     """
     from pipelines.diagnosis.diagnose import examination
+    from pipelines.jobs.model_files import use_formulas_of
     from pipelines.tables.leave_out import leave_out as without
     from pipelines.tables.leave_out import named_dwells
 
     given = recording if isinstance(recording, Recording) else read(recording)
-    judged = model.effects if isinstance(model, Calibration) else model
+    if isinstance(model, Calibration):
+        use_formulas_of(model.run)
+        judged: list[str] | None = model.effects
+    else:
+        judged = listed(model, "diagnose")
     named = named_dwells(",".join(leave_out))
     dwells = without(given.dwells, named) if named else given.dwells
     made = examination(dwells, given.history, judged, [f"{unit}:{dwell}" for unit, dwell in named])
