@@ -189,7 +189,8 @@ def fit(
     Parameters
     ----------
     recording : from :func:`tumbleline.read`, or what it reads
-    effects : ids of :func:`tumbleline.effects`; None: bias, scale, misalignment, and the terms in temperature where it varies
+    effects : ids of :func:`tumbleline.effects`; None: those of the run; of a recording bias, scale, misalignment, and terms in
+        the temperature where it varies
     leave_out : dwells as ``UNIT:DWELL``
 
     Raises

@@ -139,20 +139,16 @@ def diagnose(
     Parameters
     ----------
     recording : from :func:`tumbleline.read`, or what it reads
-    model : a fit, or ids of effects; None: the default model
+    model : a fit, or ids of effects; None: that of the run, or the default model where it has none
     leave_out : dwells as ``UNIT:DWELL``
     """
     from pipelines.diagnosis.diagnose import examination
-    from pipelines.jobs.model_files import use_formulas_of
     from pipelines.tables.leave_out import leave_out as without
     from pipelines.tables.leave_out import named_dwells
 
     given = recording if isinstance(recording, Recording) else read(recording)
-    if isinstance(model, Calibration):
-        use_formulas_of(model.run)
-        judged: list[str] | None = model.effects
-    else:
-        judged = listed(model, "diagnose")
+    of_fit = isinstance(model, Calibration)
+    judged = listed(None if of_fit else model, "diagnose", model.run if of_fit else given.run)
     named = named_dwells(",".join(leave_out))
     dwells = without(given.dwells, named) if named else given.dwells
     made = examination(dwells, given.history, judged, [f"{unit}:{dwell}" for unit, dwell in named])

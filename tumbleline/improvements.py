@@ -89,7 +89,7 @@ def improve(
     Parameters
     ----------
     recording : from :func:`tumbleline.read`, or what it reads
-    effects : the model to begin with; None: the default model
+    effects : the model to begin with; None: that of the run, or the default model where it has none
     effect : effects to add, one per class of the diagnosis; none: each that is alone in its class
     fresh : the same units measured again; it judges the change
     model_file : file to write, with the history of the model; None: no file is written
@@ -111,5 +111,5 @@ def improve(
     fresh_name = "" if again is None else again.run.id
     loop = Improvement(given.run.id, tables, None, target, "", getuser(), fresh_name, Attendant())
     named = [effect] if isinstance(effect, str) and effect else list(effect)
-    document = loop.run(listed(effects, "improve"), named, yes=not named)
+    document = loop.run(listed(effects, "improve", given.run), named, yes=not named)
     return ImprovedModel(document, fit(given, document["effects"]))

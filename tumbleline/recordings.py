@@ -94,13 +94,14 @@ class Recording:
         return as_text("Recording", self._lines())
 
 
-def listed(names: Sequence[str] | str | None, what: str) -> list[str] | None:
-    """Ids of effects from a list, or from a text with commas as of a command; None where none were given."""
+def listed(names: Sequence[str] | str | None, what: str, run: Run | None = None) -> list[str] | None:
+    """Ids of effects from a list, or from a text with commas as of a command; where none are given those of the run, or None."""
+    from pipelines.diagnosis.inputs import effects_of
     from pipelines.jobs.model_files import refuse_unknown_effects
     from schemas.errors import WrongUse
 
     if names is None:
-        return None
+        return None if run is None else effects_of(run)
     chosen = names.split(",") if isinstance(names, str) else list(names) if isinstance(names, Iterable) else []
     if not chosen or not all(isinstance(name, str) and name.strip() for name in chosen):
         raise WrongUse(

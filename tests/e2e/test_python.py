@@ -4,6 +4,7 @@ import inspect
 import json
 import subprocess
 import sys
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -122,7 +123,7 @@ def test_objects_draw_themselves_and_export_and_an_archive_is_tables(turned: pd.
     assert view.query("SELECT count(*) AS n FROM coefficients")["n"].iloc[0] == len(rows)
     assert view.calibration(fit.run.id).rms_ug == fit.rms_ug
     with pytest.raises(tl.WrongUse, match="no calibration of unit SN7 is valid on 2026-05-01"):
-        view.coefficients("SN7", at="2026-05-01")
+        view.coefficients("SN7", at=date(2026, 5, 1))
     with pytest.raises(tl.TumblelineError, match="holds no archive"):
         tl.archive(tmp_path / "nothing")
 
@@ -148,9 +149,12 @@ def test_what_is_open_is_refused_with_what_to_state(lot: tl.Example, tmp_path: P
         tl.read("latest", serial="SN1", units={"output": "g"})
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_effects_are_a_list_or_a_text_and_never_silently_the_default_model(lot: tl.Example) -> None:
     fit = tl.fit(lot.run, "bias, scale")
     assert fit.effects == tl.fit(lot.run, ["bias", "scale"]).effects == ["bias", "scale"]
+    # without a model a run is judged against its own, as by the command
+    assert tl.diagnose(fit.recording).document["effects"] == tl.fit(fit.recording).effects == fit.effects
     for judge in (tl.fit, tl.diagnose, tl.improve):
         with pytest.raises(tl.TumblelineError, match="unknown effect 'scal'; did you mean scale"):
             judge(lot.run, ["bias", "scal"])
