@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import pandas as pd
 
@@ -102,7 +102,8 @@ def listed(names: Sequence[str] | str | None, what: str, run: Run | None = None)
 
     if names is None:
         return None if run is None else effects_of(run)
-    chosen = names.split(",") if isinstance(names, str) else list(names) if isinstance(names, Iterable) else []
+    given: Any = names
+    chosen: list[Any] = given.split(",") if isinstance(given, str) else [*given] if isinstance(given, Iterable) else []
     if not chosen or not all(isinstance(name, str) and name.strip() for name in chosen):
         raise WrongUse(
             f"{what}: effects: found {names!r}, ids of effects are needed, such as ['bias', 'scale']; leave it out for the "
@@ -146,7 +147,8 @@ def read(
     from pipelines.importers.exchange import checked, checked_history, is_exchange, read_history
     from schemas.errors import WrongUse
 
-    if units is not None and not isinstance(units, Mapping):
+    several: Any = source  # anything may be given
+    if units is not None and not isinstance(cast("Any", units), Mapping):
         raise WrongUse(
             f"read: units: found {units!r}, units by quantity are needed; write units={{'output': {units!r}}}"
         )
@@ -165,7 +167,7 @@ def read(
     from pipelines.importers import files
 
     if not isinstance(source, str | Path):
-        paths = list(source) if isinstance(source, Iterable) and not isinstance(source, Mapping) else []
+        paths: list[Any] = [*several] if isinstance(several, Iterable) and not isinstance(several, Mapping) else []
         if not paths or not all(isinstance(path, str | Path) for path in paths):
             raise WrongUse(
                 f"read: found {type(source).__name__}, a file, files, a DataFrame or the name of a run is needed; make a table "
