@@ -1,6 +1,7 @@
 """An archive as tables: its runs, their tables, SQL over all of them, and the calibration of a unit on a date."""
 
 from dataclasses import asdict, dataclass, field
+from datetime import date
 from pathlib import Path
 
 import pandas as pd
@@ -36,13 +37,13 @@ class ArchiveView:
         """A table of a run: ``figures``, ``grades``, ``residuals``, ``noise``, and others."""
         return self.store.run(run).table(name)
 
-    def coefficients(self, unit: str = "", *, at: str = "", known: str = "") -> pd.DataFrame:
+    def coefficients(self, unit: str = "", *, at: str | date = "", known: str | date = "") -> pd.DataFrame:
         """Coefficients of a unit's certified calibration that is valid on a day; without a day those of every run, oldest first.
 
         Parameters
         ----------
         unit : serial number; empty: of all units, without a day only
-        at : day as ``YYYY-MM-DD`` · known : as the archive was on this day
+        at : day as ``YYYY-MM-DD`` or date · known : as the archive was on this day
 
         Raises
         ------
@@ -61,8 +62,8 @@ class ArchiveView:
         from pipelines.certificates.coefficient_remarks import coefficients_of
         from pipelines.certificates.days import day_of
 
-        day = day_of(at, "at")
-        history = Ledger(self.store).calibrations(unit, day_of(known, "known") if known else "")
+        day = day_of(str(at), "at")
+        history = Ledger(self.store).calibrations(unit, day_of(str(known), "known") if known else "")
         valid = next((calibration for calibration in history if calibration.holds(day)), None)
         if valid is None:
             there = "; ".join(

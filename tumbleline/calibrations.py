@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.archive import Archive, Run
+from schemas.units import AXES
 from tumbleline.pictures import Picture, as_html, as_text, rounded_table
 from tumbleline.recordings import Recording, Source
 
@@ -64,7 +65,8 @@ class Calibration:
 
         Parameters
         ----------
-        samples : (n, 3) in output unit, or a table with x, y, z (or out_x, …) and the quantities of the model, e.g. ``unit_C``
+        samples : (n, axes) in output unit, (axes,) of one sample, or a table with x, y, z (or out_x, …) and the quantities of the
+            model, e.g. ``unit_C``; ``supply_V`` where the output follows the supply
         unit : serial number; needed where there are several
         temperature : °C, one or (n,); for an array of samples
         rate_hz : where the samples have no column ``time_s``; it only decides ``time_s``
@@ -75,16 +77,36 @@ class Calibration:
             ``time_s``, ``force_x_g`` …, ``u_x_ug`` … (standard uncertainties) and covariances.
         """
         from pipelines.export.corrected import corrected, fit_of_unit, table_of
-        from pipelines.export.recording import recording_of
+        from pipelines.export.recording import at_calibrated_supply, recording_of
         from pipelines.jobs.model_files import use_formulas_of
+        from schemas.errors import WrongUse
 
-        table = samples if isinstance(samples, pd.DataFrame) else pd.DataFrame(np.asarray(samples), columns=list("xyz"))
-        if temperature is not None:
-            table = table.assign(unit_C=temperature)
-        rate = 1.0 if rate_hz is None and "time_s" not in table else rate_hz
         use_formulas_of(self.run)
         fit = fit_of_unit(self.run, unit, failed=True, revoked=False)
-        recording = recording_of(table, "samples", rate_hz=rate)
+        axes = fit.exported.axes
+        if isinstance(samples, pd.DataFrame):
+            table = samples
+        else:
+            values = np.asarray(samples)
+            values = values[:, None] if values.ndim == len(axes) == 1 else np.atleast_2d(values)
+            names = [AXES[axis] for axis in axes]
+            if values.ndim != 2 or values.shape[1] != len(names):
+                raise WrongUse(
+                    f"correct: samples of shape {np.shape(samples)}, (n, {len(names)}) with the outputs "
+                    f"{', '.join(names)} is needed; turn or cut the array"
+                )
+            table = pd.DataFrame(values, columns=names)
+        if temperature is not None:
+            if np.shape(temperature) not in {(), (len(table),)}:
+                raise WrongUse(
+                    f"correct: temperature of shape {np.shape(temperature)} beside {len(table)} samples, a number or one "
+                    "for each sample is needed"
+                )
+            table = table.assign(unit_C=np.broadcast_to(temperature, len(table)))
+        if rate_hz is not None and not rate_hz > 0.0:
+            raise WrongUse(f"correct: rate_hz={rate_hz:g}, more than 0 is needed; leave it out, or correct it")
+        rate = 1.0 if rate_hz is None and "time_s" not in table else rate_hz
+        recording = at_calibrated_supply(recording_of(table, "samples", rate_hz=rate, axes=axes, least=1), self.run)
         return table_of(recording, corrected(recording, fit, None))
 
     def export(self, form: str = "json", output: str | Path | None = None, **settings: Any) -> str | bytes:
@@ -94,7 +116,7 @@ class Calibration:
         ----------
         form : a format of ``tumbleline export``: json, csv, c, ardupilot, px4, …
         output : file to write; None: none is written
-        settings : of :class:`pipelines.export.settings.ExportSettings`: ``nominal``, ``arithmetic``, ``rate`` …
+        settings : of :class:`pipelines.export.settings.ExportSettings`: ``nominal``, ``arithmetic``, ``rate_hz`` …
 
         Returns
         -------
@@ -107,6 +129,10 @@ class Calibration:
 
         if form not in FORMATS:
             raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
+        if unknown := sorted(set(settings) - ExportSettings.__dataclass_fields__.keys()):
+            raise WrongUse(
+                f"export: {unknown[0]} is no setting; {did_you_mean(unknown[0], ExportSettings.__dataclass_fields__)}"
+            )
         chosen = unit_calibrations(self.run, (), failed=True)
         made = export_files(form, chosen, self.run.id, ExportSettings(**settings))
         if len(made) > 1:
@@ -154,7 +180,7 @@ class Calibration:
 
 def fit(
     recording: Recording | Source | Sequence[str | Path],
-    effects: Sequence[str] | None = None,
+    effects: Sequence[str] | str | None = None,
     *,
     leave_out: Sequence[str] = (),
 ) -> Calibration:
@@ -163,7 +189,8 @@ def fit(
     Parameters
     ----------
     recording : from :func:`tumbleline.read`, or what it reads
-    effects : ids of :func:`tumbleline.effects`; None: bias, scale, misalignment, and the terms in temperature where it varies
+    effects : ids of :func:`tumbleline.effects`; None: those of the run; of a recording bias, scale, misalignment, and terms in
+        the temperature where it varies
     leave_out : dwells as ``UNIT:DWELL``
 
     Raises
@@ -174,10 +201,10 @@ def fit(
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.rerun import again
     from pipelines.tables.leave_out import named_dwells
-    from tumbleline.recordings import read
+    from tumbleline.recordings import listed, read
 
     given = recording if isinstance(recording, Recording) else read(recording)
     archive = Archive(given.run.archive.root)
-    change = change_from_options(",".join(effects or ()), where="fit")
+    change = change_from_options(",".join(listed(effects, "fit") or ()), where="fit")
     done = again(archive, given.run.id, change, left_out=named_dwells(",".join(leave_out)))
     return Calibration(archive.run(done.new))

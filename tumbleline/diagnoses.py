@@ -11,7 +11,7 @@ import pandas as pd
 
 from tumbleline.calibrations import Calibration
 from tumbleline.pictures import Picture, as_html, as_text
-from tumbleline.recordings import Recording, Source, read
+from tumbleline.recordings import Recording, Source, listed, read
 
 if TYPE_CHECKING:
     from pipelines.diagnosis.diagnose import Examination
@@ -130,7 +130,7 @@ class ModelDiagnosis(JudgedModel):
 
 def diagnose(
     recording: Recording | Source | Sequence[str | Path],
-    model: Calibration | Sequence[str] | None = None,
+    model: Calibration | Sequence[str] | str | None = None,
     *,
     leave_out: Sequence[str] = (),
 ) -> ModelDiagnosis:
@@ -139,7 +139,7 @@ def diagnose(
     Parameters
     ----------
     recording : from :func:`tumbleline.read`, or what it reads
-    model : a fit, or ids of effects; None: the default model
+    model : a fit, or ids of effects; None: that of the run, or the default model where it has none
     leave_out : dwells as ``UNIT:DWELL``
     """
     from pipelines.diagnosis.diagnose import examination
@@ -147,7 +147,8 @@ def diagnose(
     from pipelines.tables.leave_out import named_dwells
 
     given = recording if isinstance(recording, Recording) else read(recording)
-    judged = model.effects if isinstance(model, Calibration) else model
+    of_fit = isinstance(model, Calibration)
+    judged = listed(None if of_fit else model, "diagnose", model.run if of_fit else given.run)
     named = named_dwells(",".join(leave_out))
     dwells = without(given.dwells, named) if named else given.dwells
     made = examination(dwells, given.history, judged, [f"{unit}:{dwell}" for unit, dwell in named])

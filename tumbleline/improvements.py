@@ -15,7 +15,7 @@ from pipelines.improvement.improvement import Attendant, ImprovedTables, Improve
 from tumbleline.calibrations import Calibration, fit
 from tumbleline.diagnoses import JudgedModel, ModelDiagnosis
 from tumbleline.pictures import as_html, as_text
-from tumbleline.recordings import Recording, Source, read, session_folder
+from tumbleline.recordings import Recording, Source, listed, read, session_folder
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class ImprovedModel(JudgedModel):
 
 def improve(
     recording: Recording | Source | Sequence[str | Path],
-    effects: Sequence[str] | None = None,
+    effects: Sequence[str] | str | None = None,
     *,
     effect: Sequence[str] | str = (),
     fresh: Recording | Source | Sequence[str | Path] | None = None,
@@ -89,7 +89,7 @@ def improve(
     Parameters
     ----------
     recording : from :func:`tumbleline.read`, or what it reads
-    effects : the model to begin with; None: the default model
+    effects : the model to begin with; None: that of the run, or the default model where it has none
     effect : effects to add, one per class of the diagnosis; none: each that is alone in its class
     fresh : the same units measured again; it judges the change
     model_file : file to write, with the history of the model; None: no file is written
@@ -111,5 +111,5 @@ def improve(
     fresh_name = "" if again is None else again.run.id
     loop = Improvement(given.run.id, tables, None, target, "", getuser(), fresh_name, Attendant())
     named = [effect] if isinstance(effect, str) and effect else list(effect)
-    document = loop.run(list(effects) if effects else None, named, yes=not named)
+    document = loop.run(listed(effects, "improve", given.run), named, yes=not named)
     return ImprovedModel(document, fit(given, document["effects"]))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import pandas as pd
 
@@ -94,6 +94,26 @@ class Recording:
         return as_text("Recording", self._lines())
 
 
+def listed(names: Sequence[str] | str | None, what: str, run: Run | None = None) -> list[str] | None:
+    """Ids of effects from a list, or from a text with commas as of a command; where none are given those of the run, or None."""
+    from pipelines.diagnosis.inputs import effects_of
+    from pipelines.jobs.model_files import refuse_unknown_effects
+    from schemas.errors import WrongUse
+
+    if names is None:
+        return None if run is None else effects_of(run)
+    given: Any = names
+    chosen: list[Any] = given.split(",") if isinstance(given, str) else [*given] if isinstance(given, Iterable) else []
+    if not chosen or not all(isinstance(name, str) and name.strip() for name in chosen):
+        raise WrongUse(
+            f"{what}: effects: found {names!r}, ids of effects are needed, such as ['bias', 'scale']; leave it out for the "
+            "default model"
+        )
+    ids = [name.strip() for name in chosen]
+    refuse_unknown_effects(ids, what)
+    return ids
+
+
 def read(
     source: Source | Sequence[str | Path],
     *,
@@ -110,7 +130,7 @@ def read(
     ----------
     source : a file in any format of ``tumbleline import``, several files of one recording that follow one another, a table of
         dwells in the exchange format, a DataFrame of either, or the name of a run of ``archive``
-    history : temperatures against time; that beside a file of dwells by default
+    history : temperatures against time, of dwells in the exchange format; that beside a file of dwells by default
     columns, units : meaning → column (``x``, ``y``, ``z``, ``time``, ``temperature``, …) and quantity → unit (``output``,
         ``time``); what is not stated is recognised, and told in :attr:`Recording.told`
     serial : serial number of the device; the name of the file, or A, by default
@@ -125,27 +145,61 @@ def read(
         The recording cannot be used; the message says why.
     """
     from pipelines.importers.exchange import checked, checked_history, is_exchange, read_history
+    from schemas.errors import WrongUse
 
+    several: Any = source  # anything may be given
+    if units is not None and not isinstance(cast("Any", units), Mapping):
+        raise WrongUse(
+            f"read: units: found {units!r}, units by quantity are needed; write units={{'output': {units!r}}}"
+        )
+    unused = [
+        *(["serial"] if serial else []),
+        *stated,
+        *(f"units['{what}']" for what in units or {} if what != "output"),
+    ]
     if isinstance(source, pd.DataFrame):
         if is_exchange(source.columns) and not columns:
+            _refuse(unused, "a table of dwells in the exchange format")
             past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
             return _stored(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive, units)
+        _refuse([] if history is None else ["history"], "a recording that is imported")
         return replace(_imported([_as_file(source)], columns, units, serial or "A", archive, stated), command="")
     from pipelines.importers import files
 
     if not isinstance(source, str | Path):
-        return _imported([Path(path) for path in source], columns, units, serial, archive, stated)
+        paths: list[Any] = [*several] if isinstance(several, Iterable) and not isinstance(several, Mapping) else []
+        if not paths or not all(isinstance(path, str | Path) for path in paths):
+            raise WrongUse(
+                f"read: found {type(source).__name__}, a file, files, a DataFrame or the name of a run is needed; make a table "
+                "of arrays with pandas.DataFrame(values, columns=['x', 'y', 'z'])"
+            )
+        _refuse([] if history is None else ["history"], "a recording that is imported")
+        return _imported([Path(path) for path in paths], columns, units, serial, archive, stated)
     if not files.is_file(str(source)):
+        given = {"history": history, "columns": columns, "units": units}
+        _refuse([*unused, *(name for name, value in given.items() if value is not None)], "a run of an archive")
         return Recording(Archive(None if archive is None else str(archive)).run(str(source)))
     path = Path(source)
     if columns is None and is_exchange(files.read(path)[0].columns):
         from pipelines.diagnosis.inputs import dwells_and_history
 
+        _refuse(unused, "a table of dwells in the exchange format")
         beside = history if isinstance(history, str | Path) else ""
         dwells, past, _ = dwells_and_history(str(path), str(beside), None)
         past = checked_history(history, "history", foreign=True) if isinstance(history, pd.DataFrame) else past
         return _stored(dwells, past, path.name, archive, units)
+    _refuse([] if history is None else ["history"], "a recording that is imported")
     return _imported([path], columns, units, serial, archive, stated)
+
+
+def _refuse(unused: Sequence[str], of: str) -> None:
+    """Refuse what :func:`read` was given and would not use."""
+    from schemas.errors import WrongUse
+
+    if unused:
+        raise WrongUse(
+            f"read: {', '.join(unused)}: not used for {of}, which states it itself or has none; leave it out"
+        )
 
 
 def _stored(
@@ -168,7 +222,8 @@ def _archive_address(archive: str | Path | None) -> str:
 
 def _as_file(table: pd.DataFrame) -> Path:
     """The table as a file that an import reads, named by its content."""
-    text = table.to_csv(index=False).encode()
+    named = [name for name in table.index.names if name is not None and name not in table]  # a time, most often
+    text = (table.reset_index(named) if named else table).to_csv(index=False).encode()
     path = session_folder() / hashlib.sha256(text).hexdigest()[:10] / "DataFrame.csv"
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(text)

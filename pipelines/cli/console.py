@@ -5,6 +5,8 @@ from typing import Any
 
 from rich.console import Console
 
+from schemas.log_lines import tell, wants_json
+
 COMMAND = "tumbleline "
 
 
@@ -17,14 +19,21 @@ class WordConsole(Console):
     """Text for people.
 
     With ``soft_wrap``, the default of a text here, a line is written as it is, and a terminal breaks it within a word. That holds
-    only for lines that are copied: commands, and lines with a word (a path) that is longer than the terminal is wide.
+    only for lines that are copied: commands, and lines with a word (a path) that is longer than the terminal is wide. What is
+    printed on standard error is one object of JSON where messages are (:mod:`schemas.log_lines`).
     """
 
     def print(self, *objects: Any, soft_wrap: bool | None = None, **options: Any) -> None:
         """Print as :class:`rich.console.Console` does."""
         if len(objects) == 1 and isinstance(objects[0], str) and soft_wrap is not False:
             soft_wrap = not limited(self) or _copied(objects[0], self.width)
-        super().print(*objects, soft_wrap=soft_wrap, **options)
+        if not (self.stderr and wants_json()):
+            super().print(*objects, soft_wrap=soft_wrap, **options)
+            return
+        with self.capture() as written:
+            super().print(*objects, soft_wrap=soft_wrap, **options)
+        if text := written.get().strip():
+            tell(text, "warning" if text.startswith("warning") else "info")
 
 
 def _copied(text: str, width: int) -> bool:

@@ -80,7 +80,7 @@ def command(
     from pipelines.export import filtering
     from pipelines.export.corrected import corrected, fit_of_unit
     from pipelines.export.correction import correction_document, tracking_of
-    from pipelines.export.recording import at_nominal_supply, read_recording, without_force
+    from pipelines.export.recording import at_calibrated_supply, read_recording, without_force
     from pipelines.jobs.model_files import use_formulas_of
     from pipelines.stages.uncertainty.budget_terms import archived_terms
 
@@ -97,9 +97,8 @@ def command(
     fit = fit_of_unit(run, unit, **options.included(include))
     with error_console().status(f"reading {file.name}"):
         recording = read_recording(file, named, time=time, rate_hz=rate, axes=fit.exported.axes)
+    recording = at_calibrated_supply(recording, run)
     terms = archived_terms(run.about)
-    if terms is not None and terms.follows is not None:
-        recording = at_nominal_supply(recording, terms.follows)
     turn_on = given.get("turn_on")
     if turn_on is None and terms is not None and terms.stability is not None:
         turn_on = terms.stability.switch_on_ug

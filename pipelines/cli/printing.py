@@ -14,6 +14,7 @@ from inertial.uncertainty import rounding
 from pipelines.cli.options import STANDARD_OUTPUT
 from pipelines.tables.json_values import json_value
 from schemas.errors import DONE, PART_FAILED, WrongUse
+from schemas.log_lines import wants_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -29,7 +30,8 @@ def console(*, stderr: bool = False) -> Console:
     """The console for results; brackets and colons in it are text, never markup."""
     from pipelines.cli.console import WordConsole
 
-    return WordConsole(stderr=stderr, highlight=False, markup=False, emoji=False)
+    plain = False if stderr and wants_json() else None  # no colours and no moving bar among objects of JSON
+    return WordConsole(stderr=stderr, highlight=False, markup=False, emoji=False, force_terminal=plain)
 
 
 def error_console() -> Console:

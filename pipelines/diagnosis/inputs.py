@@ -6,7 +6,7 @@ from typing import Literal
 
 import pandas as pd
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.importers.exchange import read_dwells, read_history
 from pipelines.importers.files import is_file
 from pipelines.jobs.model_files import chosen_effects, use_formulas, use_formulas_of
@@ -56,7 +56,11 @@ def judged_effects(source: str, archive: str | None, listed: str, model: Path | 
     store = Archive(archive)
     if chosen or is_file(source) or not store.runs():
         return chosen
-    run = store.run(source)
+    return effects_of(store.run(source))
+
+
+def effects_of(run: Run) -> list[str] | None:
+    """Effects of the model of a run, with its formulas in the catalogue; None if it has no model."""
     use_formulas_of(run)
     return list(run.about.get("recipe", {}).get("effects", ())) or None
 

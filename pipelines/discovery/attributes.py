@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -15,6 +16,7 @@ from pipelines.archive.attributes import FOLDER, attribute_files, known_attribut
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.discovery.documents import AddedAttributes, KnownAttribute, ListedAttributes
+from pipelines.importers.text_table import decoded
 from schemas.errors import WrongUse, close_matches, did_you_mean
 
 By = Literal["serial", "run"]
@@ -35,6 +37,8 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
         The key is missing, empty or has conflicting values, or no column of an attribute is left.
     """
     archive.refuse_none()
+    if twice := table.columns[table.columns.duplicated()].tolist():
+        raise WrongUse(f"attributes: {source} has two columns '{twice[0]}', names must differ; rename or remove one")
     key = _key_column(table, by, source)
     named = [str(name) for name in table.columns if name != key]
     refused = [name for name in named if name.lower() in NOT_DRIVERS]
@@ -163,16 +167,21 @@ def added_from(archive: Archive, path: Path, by: str) -> tuple[AddedAttributes, 
     if not path.is_file():
         raise WrongUse(f"attributes: there is no file {path}; give a .csv or .parquet file")
     try:
-        if path.suffix.lower() == ".parquet":
-            table = pd.read_parquet(path)
-        else:
-            table = pd.read_csv(path, dtype=str, keep_default_na=False)
+        table = pd.read_parquet(path) if path.suffix.lower() == ".parquet" else _text_table(path)
     except (ValueError, OSError) as problem:  # pandas' and Arrow's errors of a file are of these kinds
         raise WrongUse(
             f"attributes: {path} is no table ({str(problem).splitlines()[0]}); give a .csv or .parquet file"
         ) from None
     added = add_attributes(archive, table, cast("By", by), path.name)
     return added, sentences(added)
+
+
+def _text_table(path: Path) -> pd.DataFrame:
+    """The cells of a text file as text; divided by commas, or by semicolons or tabs as spreadsheets of some countries save it."""
+    text, _ = decoded(path.read_bytes(), path.name)
+    head = text.partition("\n")[0]
+    rows = pd.read_csv(StringIO(text), sep=max(",;\t", key=head.count), header=None, dtype=str, keep_default_na=False)
+    return rows[1:].set_axis(list(rows.iloc[0]), axis=1)
 
 
 def listed(archive: Archive) -> ListedAttributes:

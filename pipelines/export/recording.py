@@ -14,9 +14,10 @@ from inertial.arrays import Array
 from inertial.counts import number_of
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS
 from inertial.state import ALL_AXES, State
+from pipelines.archive import Run
 from pipelines.importers import files
 from pipelines.importers.values import as_numbers, finite_column
-from pipelines.stages.reduce import FollowedSupply
+from pipelines.stages.uncertainty.budget_terms import archived_terms
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
 from schemas.units import AXES
@@ -69,8 +70,9 @@ def recording_of(
     time: str = "",
     rate_hz: float | None = None,
     axes: Sequence[int] = ALL_AXES,
+    least: int = 2,
 ) -> CorrectableRecording:
-    """The recording of a table of samples, as :func:`read_recording` reads it; ``where``: its name, for messages."""
+    """The recording of a table of ``least`` samples or more, as :func:`read_recording`; ``where``: its name, for messages."""
     there = list(table.columns)
     letters = [AXES[axis] for axis in axes]
     usual = ([names[axis] for axis in axes] for names in USUAL)
@@ -86,9 +88,9 @@ def recording_of(
     if rate_hz is not None and time:
         raise WrongUse(f"{where}: --map time=… and --rate are both given, one is needed; leave one out")
     moments = np.arange(n) / rate_hz if rate_hz is not None else finite_column(table, time or TIME, where)
-    if n < 2 or not np.all(np.diff(moments) > 0.0):
+    if n < least or not np.all(np.diff(moments) > 0.0):
         raise DataRejected(
-            f"{where}: {n} samples whose time does not always increase, two or more in order are needed; sort the "
+            f"{where}: {n} samples whose time does not always increase, {least} or more in order are needed; sort the "
             "file, or cut it where its clock restarts"
         )
     known = np.full((n, 3), np.nan)
@@ -98,8 +100,12 @@ def recording_of(
     return CorrectableRecording(moments, output, state, known, where)
 
 
-def at_nominal_supply(recording: CorrectableRecording, follows: FollowedSupply) -> CorrectableRecording:
-    """The recording with the outputs at the nominal supply, as the calibration has them; its supply is needed."""
+def at_calibrated_supply(recording: CorrectableRecording, run: Run) -> CorrectableRecording:
+    """The recording with the outputs at the nominal supply, where the calibration has them so; its supply is needed then."""
+    terms = archived_terms(run.about)
+    if terms is None or terms.follows is None:
+        return recording
+    follows = terms.follows
     supply = recording.state.supply
     if supply is None or not np.all(supply > 0.0):
         raise DataRejected(

@@ -15,6 +15,7 @@ from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Request
 from schemas.errors import UNUSABLE
+from tumbleline import Calibration
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 RECIPE = """
@@ -171,6 +172,9 @@ def test_a_trajectory_along_its_axis_comes_back_through_simulate_and_correct(mea
     corrected = pd.read_csv(tmp_path / "done.csv")
     assert np.abs(corrected["force_x_g"] - force[:, 0]).max() < 1e-8
     assert not {"force_y_g", "u_y_ug", "cov_xy_ug2"} & set(corrected)
+    ours = Calibration(Archive(str(folder / "archive")).run(runs["one"]))
+    done_here = ours.correct(raw["x"].to_numpy(), unit="SF-02", temperature=raw["unit_C"], rate_hz=50.0)
+    assert np.abs(done_here["force_x_g"] - force[:, 0]).max() < 1e-8
     noisy = document_of(
         "simulate", tmp_path / "way.csv", calibration, "--seed", "1", "--output", tmp_path / "n.csv", *archive
     )

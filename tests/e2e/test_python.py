@@ -4,6 +4,7 @@ import inspect
 import json
 import subprocess
 import sys
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,7 @@ def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataF
     run = tl.read(turned.drop(columns="turn"), units={"output": "g"})
     assert any("ax, ay, az" in line for line in run.told)
     assert len(run.dwells) == 24
+    assert tl.read(turned[["t", "ax", "ay", "az"]].set_index("t"), units={"output": "g"}).dwells.equals(run.dwells)
     fit = tl.fit(run)
     diagnosis = tl.diagnose(run, fit)
     assert diagnosis.adequate is False
@@ -121,7 +123,7 @@ def test_objects_draw_themselves_and_export_and_an_archive_is_tables(turned: pd.
     assert view.query("SELECT count(*) AS n FROM coefficients")["n"].iloc[0] == len(rows)
     assert view.calibration(fit.run.id).rms_ug == fit.rms_ug
     with pytest.raises(tl.WrongUse, match="no calibration of unit SN7 is valid on 2026-05-01"):
-        view.coefficients("SN7", at="2026-05-01")
+        view.coefficients("SN7", at=date(2026, 5, 1))
     with pytest.raises(tl.TumblelineError, match="holds no archive"):
         tl.archive(tmp_path / "nothing")
 
@@ -134,6 +136,42 @@ def test_what_is_open_is_refused_with_what_to_state(lot: tl.Example, tmp_path: P
         tl.read(tmp_path / "absent.csv")
     with pytest.raises(tl.DataRejected, match="every unit is needed in both"):
         tl.improve(lot.run, lot.model, fresh=lot.fresh.dwells.query("unit != 'DEMO-1'"))
+    for wrong in (table.to_numpy(), table["p"], {"p": [1.0]}, None, 5, b"p", []):
+        with pytest.raises(tl.WrongUse, match=rf"read: found {type(wrong).__name__}, .* DataFrame"):
+            tl.read(wrong)
+    with pytest.raises(tl.WrongUse, match=r"write units=\{'output': 'g'\}"):
+        tl.read(table, units="g")
+    with pytest.raises(tl.WrongUse, match="history: not used for a recording that is imported"):
+        tl.read(table, history=lot.run.history)
+    with pytest.raises(tl.WrongUse, match="serial, rate_hz: not used for a table of dwells"):
+        tl.read(lot.run.dwells, serial="SN1", rate_hz=100.0)
+    with pytest.raises(tl.WrongUse, match="serial, units: not used for a run"):
+        tl.read("latest", serial="SN1", units={"output": "g"})
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+def test_effects_are_a_list_or_a_text_and_never_silently_the_default_model(lot: tl.Example) -> None:
+    fit = tl.fit(lot.run, "bias, scale")
+    assert fit.effects == tl.fit(lot.run, ["bias", "scale"]).effects == ["bias", "scale"]
+    # without a model a run is judged against its own, as by the command
+    assert tl.diagnose(fit.recording).document["effects"] == tl.fit(fit.recording).effects == fit.effects
+    for judge in (tl.fit, tl.diagnose, tl.improve):
+        with pytest.raises(tl.TumblelineError, match="unknown effect 'scal'; did you mean scale"):
+            judge(lot.run, ["bias", "scal"])
+        for nothing in ([], "", 5):
+            with pytest.raises(tl.WrongUse, match="ids of effects are needed"):
+                judge(lot.run, nothing)
+    force = fit.correct(np.array([0.0, 0.0, 1.0]), unit="DEMO-1", temperature=25.0)
+    assert len(force) == 1
+    for samples, stated, message in (
+        (np.zeros((5, 2)), {}, r"\(5, 2\), \(n, 3\)"),
+        (np.zeros((5, 3)), {"temperature": [1.0, 2.0]}, "temperature of shape"),
+        (np.zeros((5, 3)), {"rate_hz": 0.0}, "rate_hz=0"),
+    ):
+        with pytest.raises(tl.WrongUse, match=message):
+            fit.correct(samples, unit="DEMO-1", **stated)
+    with pytest.raises(tl.WrongUse, match="export: nominl is no setting; did you mean nominal"):
+        fit.export("c", nominl=1.0)
 
 
 def test_a_name_is_imported_when_it_is_used() -> None:

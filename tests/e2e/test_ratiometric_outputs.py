@@ -26,6 +26,7 @@ from schemas.units import AXES
 from stations.opening import make_plant
 from stations.plant.noise import UnitNoise
 from stations.plant.preset import load_preset
+from tumbleline import Calibration
 
 RECIPE = ROOT / "deploy" / "recipes" / "analogue.toml"
 STATION = ROOT / "deploy" / "stations" / "simulated.toml"
@@ -189,6 +190,10 @@ def test_a_recording_at_another_supply_is_corrected_to_the_same_force(lot: Simpl
     text_of("correct", tmp_path / "raw.csv", *correct, "--output", tmp_path / "corrected.csv", status=0)
     force = pd.read_csv(tmp_path / "corrected.csv")[[f"force_{axis}_g" for axis in AXES]].to_numpy()
     assert np.abs(force - own[[f"force_{axis}" for axis in AXES]].to_numpy()).max() < 1e-3
+    ours = Calibration(lot.run).correct(raw, unit="C0")[[f"force_{axis}_g" for axis in AXES]]
+    assert np.abs(ours.to_numpy() - force).max() < 1e-9
+    with pytest.raises(DataRejected, match="add a column supply_V"):
+        Calibration(lot.run).correct(raw.drop(columns="supply_V"), unit="C0")
     raw.drop(columns="supply_V").to_csv(tmp_path / "bare.csv", index=False)
     assert "add a column supply_V" in refused("correct", tmp_path / "bare.csv", *correct)
     assert "the coefficients hold at 3 V of supply" in given("export", lot.run.id, *archive, "--format", "json")[2]

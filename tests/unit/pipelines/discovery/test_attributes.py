@@ -8,7 +8,7 @@ from each import each
 
 from pipelines.archive import Archive
 from pipelines.archive.attributes import known_attributes
-from pipelines.discovery.attributes import add_attributes, as_numbers, sentences
+from pipelines.discovery.attributes import add_attributes, added_from, as_numbers, sentences
 from schemas.errors import WrongUse
 
 
@@ -65,7 +65,19 @@ REFUSED = {
     "serial,grade A1,pass": "grade follow from the result",
     "serial,wafer ,W1": "a row without serial",
     "serial,wafer A1,W1 A1,W2": "two values of wafer for A1 (W1, W2)",
+    "serial,wafer,wafer A1,W1,W2": "two columns 'wafer', names must differ",
 }
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "cp1252", "utf-16"])
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_table_is_read_as_a_spreadsheet_saves_it(
+    archive: Archive, tmp_path: Path, separator: str, encoding: str
+) -> None:
+    lines = ("serial,Größe", "A1,groß", "A2,")
+    (tmp_path / "a.csv").write_text("\r\n".join(lines).replace(",", separator), encoding=encoding)
+    added, _ = added_from(archive, tmp_path / "a.csv", "serial")
+    assert (added["added"], known_attributes(archive).of("A1", "r", "Größe")) == (1, "groß")
 
 
 @each(REFUSED)

@@ -21,6 +21,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from root_process import ROOT
 
 from pipelines.archive import Archive, files
+from pipelines.cli.printing import remark
 from pipelines.monitoring import snapshot as snapshots
 from pipelines.monitoring.alerts import Poster, alerts_of
 from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader, LineNumbers, RunTime
@@ -298,7 +299,9 @@ def test_alerts_are_posted_as_they_come_and_go_on_after_a_refusal_and_an_unexpec
     assert [one["kind"] for one in accepted] == ["unsafe"]
 
 
-def test_messages_and_the_error_of_a_command_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_and_the_error_of_a_command_are_text_or_json(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.delenv("TUMBLELINE_LOG", raising=False)
     assert log_line("line-1: it is", queue="line-1") == "tumbleline: line-1: it is\n"
     monkeypatch.setenv("TUMBLELINE_LOG", "json")
@@ -307,6 +310,10 @@ def test_messages_and_the_error_of_a_command_are_text_or_json(monkeypatch: pytes
     content = json.loads(line)
     assert (content["message"], content["level"], content["queue"]) == ("a\n“b”", "error", "line-1")
     assert datetime.fromisoformat(content["when"]).tzinfo is not None
+    remark("warning: a\nb", style="yellow")  # as the progress and the remarks of a command
+    remark("")
+    content = json.loads(capsys.readouterr().err)
+    assert (content["message"], content["level"]) == ("warning: a\nb", "warning")
     status, _, err = given("--log", "json", "shw")
     assert status == 2
     content = json.loads(err)
