@@ -45,7 +45,7 @@ STATED = {"repeatability_percent": "magnitude_uncertainty", "repeatability_deg":
 """Keys of a sweep that state the uncertainty of every point."""
 OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan, "pressure_hPa": np.nan}
 FEWEST = 8
-_WORDS = {"frequency": ("freq",), "magnitude": ("mag", "gain", "sens"), "phase": ("phase",)}
+_WORDS = {"frequency": ("freq",), "magnitude": ("mag", "gain", "sens", "betrag", "empfind"), "phase": ("phase",)}
 
 
 @dataclass(frozen=True)
