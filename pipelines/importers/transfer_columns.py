@@ -22,8 +22,8 @@ from pipelines.importers.values import finite_column
 from pipelines.procedures.sweep_points import SweepPart
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
-from schemas.units import STANDARD_GRAVITY_M_S2
 from schemas.toml_files import explain, parse_toml, read_text
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 DECIBEL = float(np.log(10.0)) / 20.0
 """Change of the logarithm of a magnitude for 1 dB."""
