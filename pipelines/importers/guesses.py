@@ -35,6 +35,8 @@ _DAY = r"\s*\d{1,4}[./-]\d{1,2}[./-]\d{1,4}\s*"
 _FEW = 30
 _MOST_POSITIONS = 500
 _LIKELY_HZ = 100.0
+CHECK = ": check"
+"""End of the reason of a unit of time that is one of several."""
 EXCHANGE = "the exchange format"
 _OF_EXCHANGE = {
     "unit": "unit",
@@ -326,7 +328,7 @@ def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, G
             )
         possible = slow or possible
     near = min(possible, key=lambda unit: abs(np.log(1.0 / (step * clocks.TIME_UNITS[unit]) / _LIKELY_HZ)))
-    return Guess(near, f"{seen.reason} allow {', '.join(clocks.rates_in(step, possible))}: check")
+    return Guess(near, f"{seen.reason} allow {', '.join(clocks.rates_in(step, possible))}{CHECK}")
 
 
 def _output(
