@@ -114,8 +114,8 @@ def _recognised(
         )
     if not time_unit and known.time_unit.reason.endswith(guesses.CHECK):  # N would be off by the root of a wrong rate
         raise WrongUse(
-            f"{path.name}: time '{shown(time)}': {known.time_unit.reason.removesuffix(guesses.CHECK)}, one of them is needed; add "
-            f"--unit-of time={known.time_unit.meaning} if it is that, or --rate HZ"
+            f"{path.name}: time '{shown(time)}': {known.time_unit.reason.removesuffix(guesses.CHECK)}, one of them is needed; "
+            f"add --unit-of time={known.time_unit.meaning} if it is that, or --rate HZ"
         )
     axes = [name for axis in AXES if (name := known.column(axis))]
     return time, known.time_unit.meaning or "s", columns or axes, known.output.meaning if axes else ""
