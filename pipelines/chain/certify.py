@@ -202,5 +202,7 @@ def _how_to_grade(run: Run) -> str:
         return "it is not finished: give its 'tumbleline run' again and it goes on"
     if axis := run.about.get("plane_across"):
         return f"it was turned about {axis} alone, the scale of {axis} is not known: measure other orientations"
+    if "dwells" not in run.tables() and "procedure_figures" in run.tables():
+        return "a dynamic test was imported: certificates of one need a recipe that measures it ('tumbleline run')"
     again = f"'tumbleline fit {run.id} --limits FILE'"
     return f"it was imported: fit it against limits with {again} and certify the run that this makes"

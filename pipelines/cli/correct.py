@@ -96,7 +96,8 @@ def command(
     use_formulas_of(run)
     fit = fit_of_unit(run, unit, **options.included(include))
     with error_console().status(f"reading {file.name}"):
-        recording = read_recording(file, named, time=time, rate_hz=rate, axes=fit.exported.axes)
+        exported = fit.exported
+        recording = read_recording(file, named, time=time, rate_hz=rate, axes=exported.axes, unit=exported.out_unit)
     recording = at_calibrated_supply(recording, run)
     terms = archived_terms(run.about)
     turn_on = given.get("turn_on")

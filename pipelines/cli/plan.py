@@ -122,6 +122,7 @@ def plan_recipe(
     planned = planned_recipe(recipe, effects, model, archive, config.name)
     planned = with_moved_poses(planned, moves_of(pose or (), "plan"), "plan")
     refuse_missing_full(planned, folder_of(recipe))
+    _tell_fillings(len(planned.units), config.devices.slots.count)
     try:
         limits = load_limits(planned, folder_of(recipe))
     except RecipeInvalid:
@@ -145,6 +146,15 @@ def plan_recipe(
         write_pictures(pictures, document, context)
     passed = not refused and not (document.get("uncertainty") or {}).get("unreachable")
     conclude(document, print_plan, as_json=as_json, passed=passed)
+
+
+def _tell_fillings(units: int, slots: int) -> None:
+    """Say how often a fixture is filled for a lot that is larger: the plan is that of one filling."""
+    if units > slots:
+        remark(
+            f"{units} units, the fixture has {slots} slots: {-(-units // slots)} fillings, each of the station time below; "
+            "'tumbleline run' asks for each at a terminal, and refuses such a lot elsewhere"
+        )
 
 
 def _warned(messages: list[str]) -> list[str]:

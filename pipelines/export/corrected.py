@@ -113,12 +113,11 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
     ----------
     unit : serial number; may be empty where the run has a single unit
     """
+    refuse_other_procedures(run, "coefficients")
     missing = [name for name in ("coefficients", "covariance") if name not in run.tables()]
     if missing:
-        raise WrongUse(
-            f"run {run.id}: it has no {' and no '.join(missing)}, a fitted run is needed; repeat its 'tumbleline run'"
-        )
-    refuse_other_procedures(run, "coefficients")
+        again = "repeat its 'tumbleline run'" if run.about.get("capture") else f"fit it with 'tumbleline fit {run.id}'"
+        raise WrongUse(f"run {run.id}: it has no {' and no '.join(missing)}, a fitted run is needed; {again}")
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     if not unit and len(calibration.units) > 1:
         raise WrongUse(

@@ -190,6 +190,7 @@ def _imported(run: Run, serials: tuple[str, ...]) -> Chosen:
             f"export: run {run.id} was turned about {axis} alone: the scale of {axis} is not known, and a correction needs three "
             f"axes; measure other orientations ('tumbleline fit {run.id}' prints what is known of the others)"
         )
+    refuse_other_procedures(run, "coefficients")
     missing = [name for name in ("dwells", "coefficients", "covariance") if name not in run.tables()]
     if missing:
         raise WrongUse(

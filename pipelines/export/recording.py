@@ -16,6 +16,8 @@ from inertial.quantities import BY_COLUMN, FORCE_COLUMNS
 from inertial.state import ALL_AXES, State
 from pipelines.archive import Run
 from pipelines.importers import files
+from pipelines.importers.clocks import unit_stated
+from pipelines.importers.stated_units import column_name, output_unit
 from pipelines.importers.values import as_numbers, finite_column
 from pipelines.stages.uncertainty.budget_terms import archived_terms
 from schemas.errors import DataRejected, WrongUse
@@ -44,7 +46,13 @@ class CorrectableRecording:
 
 
 def read_recording(
-    path: Path, columns: Sequence[str], *, time: str = "", rate_hz: float | None = None, axes: Sequence[int] = ALL_AXES
+    path: Path,
+    columns: Sequence[str],
+    *,
+    time: str = "",
+    rate_hz: float | None = None,
+    axes: Sequence[int] = ALL_AXES,
+    unit: str = "",
 ) -> CorrectableRecording:
     """The recording of a file of samples.
 
@@ -52,13 +60,26 @@ def read_recording(
     ----------
     columns : of the output x, y, z, as far as ``axes`` go; by default x, y, z or out_x, out_y, out_z
     time : column of the time in s, ``time_s`` by default; rate_hz : instead of a column
+    unit : of the outputs; empty: not known
 
     Raises
     ------
     DataRejected
         A column is missing, a value is not finite, or the time does not always increase.
+    WrongUse
+        The file states another unit for the time or an output.
     """
-    table, _ = files.read(path)
+    content, _ = files.read_content(path)
+    table = content.table
+    names = list(map(str, table.columns))
+    columns, time = [column_name(names, name) or name for name in columns], column_name(names, time) or time
+    states = {name: output_unit(content.units.get(name, "")) for name in columns if unit}
+    states |= {time: unit_stated(content.units.get(time, ""))} if time else {}
+    for name, found in states.items():
+        if found not in {"", needed := "s" if name == time else unit}:
+            raise WrongUse(
+                f"{path.name}: column '{shown(name)}' states {found}, {needed} is needed; convert the column"
+            )
     return recording_of(table, path.name, columns, time=time, rate_hz=rate_hz, axes=axes)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,9 +29,14 @@ _SPREAD = re.compile(
 _OF_SENSOR = re.compile(r"imu|acc|gyr|gtemp|sensor|die|chip|mpu|unit", re.IGNORECASE)
 _FASTEST_K_S = 2.0
 """Rate of temperature that no chamber reaches."""
+_GROWS = re.compile(r"^(?:freq|f/|rpm|speed|angle|winkel)", re.IGNORECASE)
+"""Names of what a test raises from row to row."""
+_DAY = r"\s*\d{1,4}[./-]\d{1,2}[./-]\d{1,4}\s*"
 _FEW = 30
 _MOST_POSITIONS = 500
 _LIKELY_HZ = 100.0
+CHECK = ": check"
+"""End of the reason of a unit of time that is one of several."""
 EXCHANGE = "the exchange format"
 _OF_EXCHANGE = {
     "unit": "unit",
@@ -93,7 +99,7 @@ def guesses(content: Content) -> Guesses:
     guessed: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
     numeric = {str(name): numbers for name in table.columns if (numbers := _numbers(table[name])) is not None}
     inside = _named(table, numeric, guessed)
-    _time(table, numeric, guessed, inside)
+    _time(content, numeric, guessed, inside)
     found = triads.Triad() if _single_axis(numeric, guessed) else _axes(content, numeric, guessed)
     _others(content, table, numeric, guessed)
     sheet = _sheet(table, numeric, guessed, inside)
@@ -168,10 +174,11 @@ def _grows(numbers: Array, inside: Flags | None = None) -> bool:
     return steps.size > 1 and bool(np.mean(steps >= 0.0) > 0.99) and bool(np.any(steps > 0.0))
 
 
-def _time(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> None:
+def _time(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> None:
     if _column(guessed, "time"):
         return
-    free = [name for name, guess in guessed.items() if not guess.meaning]
+    table = content.table
+    free = [name for name, guess in guessed.items() if not (guess.meaning or _is_of_else(name, content.units))]
     for name in free:
         if values.is_moment(table[name]) or (name not in numeric and _reads_as_time(table[name])):
             guessed[name] = Guess("time", "stamps of date or time")
@@ -188,6 +195,13 @@ def _time(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Gue
         guessed[even[0]] = Guess("time", "the first column that only increases")
 
 
+def _is_of_else(name: str, units: Mapping[str, str]) -> bool:
+    """Whether name or unit say another quantity than time: an angle, a temperature, a frequency, a sensitivity."""
+    unit = units.get(name, "")
+    other = "/" in unit or output_unit(unit) not in {"", "LSB"} or not triads.may_be_output("", unit)
+    return other or _GROWS.search(name) is not None
+
+
 def _reads_as_time(column: pd.Series) -> bool:
     head = column.dropna().head(50).reset_index(drop=True)
     if not len(head) or not clocks.is_stamps(head):
@@ -200,7 +214,7 @@ def _reads_as_time(column: pd.Series) -> bool:
 
 
 _REFERENCE = re.compile(r"^(?:force|ref|true|applied)\w*$|^g(?:_in)?$", re.IGNORECASE)
-_TILT = re.compile(r"angle|tilt|incl|theta|^deg", re.IGNORECASE)
+_TILT = re.compile(r"angle|tilt|incl|theta|^deg|winkel|neigung", re.IGNORECASE)
 _SINGLE_OUT = re.compile(r"^(?:out|volt|output|acc|signal|reading|lsb|counts?|u)\w*$|^v$", re.IGNORECASE)
 _FOLLOWS = 0.99
 """Correlation of an output with its reference from which a table is that of one axis."""
@@ -208,9 +222,10 @@ _FOLLOWS = 0.99
 
 def _single_axis(numeric: dict[str, Array], guessed: dict[str, Guess]) -> bool:
     """Whether a table is that of a device with one axis: one output follows one force, or the sine or cosine of one angle."""
-    forces = [name for name in numeric if _REFERENCE.search(name)]
+    plain = {name: re.sub(r"\s*[\[(].*$", "", name) for name in numeric}  # without a unit in brackets
+    forces = [name for name in numeric if _REFERENCE.search(plain[name])]
     angles = [name for name in numeric if _TILT.search(name)]
-    outputs = [name for name in numeric if _SINGLE_OUT.search(name) and name not in (*forces, *angles)]
+    outputs = [name for name in numeric if _SINGLE_OUT.search(plain[name]) and name not in (*forces, *angles)]
     if len(outputs) != 1 or len(forces) + len(angles) != 1:
         return False
     (output,), ((reference,), meaning) = outputs, (forces, "force_x") if forces else (angles, "tilt")
@@ -266,7 +281,9 @@ def _others(content: Content, table: pd.DataFrame, numeric: dict[str, Array], gu
         spread = _SPREAD.match(name)
         if name in numeric and spread:
             guessed[name] = Guess(f"sd_{(spread[1] or spread[2]).lower()}", "its name")
-        elif name not in numeric and table[name].dtype.kind not in "fiu" and not _column(guessed, "dwell"):
+        elif name not in numeric and table[name].dtype.kind not in "fiuM" and not _column(guessed, "dwell"):
+            if table[name].astype(str).str.fullmatch(_DAY).mean() > 0.5:
+                continue  # a day is no pose
             distinct = int(table[name].nunique())
             if 1 < distinct <= max(2, len(table) // 10):
                 guessed[name] = Guess("dwell", f"{distinct} labels")
@@ -311,7 +328,7 @@ def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, G
             )
         possible = slow or possible
     near = min(possible, key=lambda unit: abs(np.log(1.0 / (step * clocks.TIME_UNITS[unit]) / _LIKELY_HZ)))
-    return Guess(near, f"{seen.reason} allow {', '.join(clocks.rates_in(step, possible))}: check")
+    return Guess(near, f"{seen.reason} allow {', '.join(clocks.rates_in(step, possible))}{CHECK}")
 
 
 def _output(

@@ -168,8 +168,9 @@ def positions(means: Array) -> int:
 
 
 def has_reference(keys: dict[str, Any]) -> bool:
-    """Whether the pose of every dwell is known: by the face that is up, its force, or the angles of a table."""
-    return "face" in keys or any(set(names) <= set(keys["columns"]) for names in (FORCE_COLUMNS, ("outer", "inner")))
+    """Whether the pose of every dwell is known: by the face that is up, its force, or angles; of few axes by one."""
+    known = (FORCE_COLUMNS, ("outer", "inner"), *([("tilt",), ("force_x",)] if "axes" in keys else []))
+    return "face" in keys or any(set(names) <= set(keys["columns"]) for names in known)
 
 
 def _six_faces(means: Array, labels: Sequence[str], centre: Array) -> tuple[dict[str, str], str]:

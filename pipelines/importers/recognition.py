@@ -53,6 +53,8 @@ class Recognition:
 
     def for_fit(self) -> Proposal | None:
         """The import with a fit, where nothing has to be added but what may be assumed; None otherwise."""
+        if self.keys is not None and self.guessed.single and not self.open:  # one axis with its reference
+            return Proposal(self.keys)
         if self.keys is None or self.output is None or any(text != _NO_CLOCK for text in self.open):
             return None
         if self.guessed.dwells:

@@ -70,7 +70,7 @@ def series_of_file(
     content, _ = files.read_content(path)
     table, found, known_unit = content.table, "", ""
     if taken := not time and rate_hz is None:
-        time, found, columns, known_unit = _recognised(content, path, columns)
+        time, found, columns, known_unit = _recognised(content, path, columns, time_unit)
     time_unit = time_unit or found or "s"
     if time_unit not in TIME_UNITS:
         raise WrongUse(
@@ -101,7 +101,9 @@ def series_of_file(
     return EvenSeries(tuple(chosen), values, float(rate), unit, path.name, recognised)
 
 
-def _recognised(content: Content, path: Path, columns: Sequence[str]) -> tuple[str, str, Sequence[str], str]:
+def _recognised(
+    content: Content, path: Path, columns: Sequence[str], time_unit: str
+) -> tuple[str, str, Sequence[str], str]:
     """Column of the time and its unit, those of the outputs where none are named, and their unit, as an import takes them."""
     known = guesses.guesses(content)
     time = known.column("time")
@@ -109,6 +111,11 @@ def _recognised(content: Content, path: Path, columns: Sequence[str]) -> tuple[s
         found = ", ".join(shown(str(name)) for name in content.table.columns)
         raise WrongUse(
             f"{path.name}: none of the columns {found} is recognised as the time; give --map time=COLUMN or --rate HZ"
+        )
+    if not time_unit and known.time_unit.reason.endswith(guesses.CHECK):  # N would be off by the root of a wrong rate
+        raise WrongUse(
+            f"{path.name}: time '{shown(time)}': {known.time_unit.reason.removesuffix(guesses.CHECK)}, one of them is needed; "
+            f"add --unit-of time={known.time_unit.meaning} if it is that, or --rate HZ"
         )
     axes = [name for axis in AXES if (name := known.column(axis))]
     return time, known.time_unit.meaning or "s", columns or axes, known.output.meaning if axes else ""

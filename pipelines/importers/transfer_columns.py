@@ -17,19 +17,21 @@ from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points
 from pipelines.importers.content import Content, unit_in
 from pipelines.importers.mapping import pairs
+from pipelines.importers.stated_units import output_unit
 from pipelines.importers.values import finite_column
 from pipelines.procedures.sweep_points import SweepPart
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.toml_files import explain, parse_toml, read_text
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 DECIBEL = float(np.log(10.0)) / 20.0
 """Change of the logarithm of a magnitude for 1 dB."""
-LINEAR, IN_DECIBEL = "", "dB"
+LINEAR, IN_DECIBEL, PER_M_S2 = "", "dB", "1/(m/s^2)"
 OF_ANGLE = {"deg": 1.0, "rad": float(np.degrees(1.0))}
 UNITS: Mapping[str, Mapping[str, float]] = {
     "frequency": {"Hz": 1.0, "kHz": 1e3, "rad/s": 0.5 / np.pi},
-    "magnitude": {LINEAR: 1.0, IN_DECIBEL: DECIBEL},
+    "magnitude": {LINEAR: 1.0, IN_DECIBEL: DECIBEL, PER_M_S2: STANDARD_GRAVITY_M_S2},
     "phase": OF_ANGLE,
     "magnitude_uncertainty": {"%": 1.0, IN_DECIBEL: 100.0 * DECIBEL},
     "phase_uncertainty": OF_ANGLE,
@@ -45,7 +47,7 @@ STATED = {"repeatability_percent": "magnitude_uncertainty", "repeatability_deg":
 """Keys of a sweep that state the uncertainty of every point."""
 OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan, "pressure_hPa": np.nan}
 FEWEST = 8
-_WORDS = {"frequency": ("freq",), "magnitude": ("mag", "gain", "sens"), "phase": ("phase",)}
+_WORDS = {"frequency": ("freq",), "magnitude": ("mag", "gain", "sens", "betrag", "empfind"), "phase": ("phase",)}
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,10 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
     stated = content.units.get(column, "") or unit_in(column) or (ending if _plain(ending) in UNITS[meaning] else "")
     known = UNITS[meaning]
     unit = _plain(given or stated)
-    if meaning == "magnitude":  # output per g in any unit, unless it is said to be a level
+    if meaning == "magnitude":  # output in any unit per g, unless it is said to be a level, or per m/s²
+        per = re.search(r"/\s*\(?\s*(m.*?)[)\]\s]*$", given or stated or column)
+        if per and output_unit(per[1]) == "m/s^2":
+            return PER_M_S2
         return IN_DECIBEL if unit.lower().startswith(IN_DECIBEL.lower()) else LINEAR
     if unit not in known:
         what = f"unit '{shown(given or stated)}'" if given or stated else "no unit"

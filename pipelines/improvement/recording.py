@@ -60,7 +60,7 @@ def bring_in(
         "form": seen.source.form,
         "rows": len(seen.content.table),
         "columns": {meaning: column for meaning in proposal.keys["columns"] if (column := guessed.column(meaning))},
-        "reason": guessed.triad.reason,
+        "reason": guessed.triad.reason or guessed.columns[guessed.column("x")].reason,
         "output_unit": guessed.output.meaning,
         "output_reason": guessed.output.reason,
         "rate_hz": seen.rate_hz,

@@ -13,6 +13,7 @@ from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import RECORDS, STAGES, Tables
 from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
+from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_change import ModelChange
@@ -217,6 +218,7 @@ def _import_plan(
 
 def _fit_for_a_fit(run: Run) -> pd.DataFrame:
     """The run's dwells, refused where the fit of a lot has nothing to work with."""
+    refuse_other_procedures(run, "dwells")
     if "dwells" not in run.tables():
         raise DataRejected(
             f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or block_s"

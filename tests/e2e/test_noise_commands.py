@@ -115,6 +115,9 @@ def test_a_wrong_name_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_tol
     table[["ax", "ay"]].to_csv(tmp_path / "no_time.csv", index=False)
     message = refused("noise", "allan", tmp_path / "no_time.csv")
     assert "none of the columns ax, ay is recognised as the time; give --map time=COLUMN or --rate HZ" in message
+    table.assign(t=500 + np.arange(len(table)))[["t", "ax"]].to_csv(tmp_path / "counted.csv", index=False)
+    message = refused("noise", "allan", tmp_path / "counted.csv")
+    assert "allow 1 Hz in s, 1000 Hz in ms, one of them is needed; add --unit-of time=ms if it is that" in message
     table.drop(index=700).to_csv(tmp_path / "gap.csv", index=False)
     assert "after row 700 the time steps by 0.02 s" in refused(
         "noise", "allan", tmp_path / "gap.csv", "--map", "time=t"

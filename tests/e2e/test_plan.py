@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from capture_double import CaptureDouble
+from capture_double import CaptureDouble, recipe_file
 from each import each
 from in_process import document_of, given, refused, text_of
 from root_process import ROOT
@@ -146,6 +146,13 @@ REFUSED_BY_RUN = {
     'seed = 1\nlimits = "consumer"\n': "verification_norm_ug, verification_ratio, bias_error_ug need verification poses",
     "static_record_s = 60.0\nstatic_temperature_C = 300.0\n": "key 'static_temperature_C': 300 °C, the chamber",
 }
+
+
+def test_a_lot_larger_than_the_fixture_is_told_with_its_fillings(tmp_path: Path) -> None:
+    recipe = recipe_file(tmp_path, ('"A1"', ", ".join(f'"B{k}"' for k in range(9)) + ', "A1"'))
+    status, _, told = given("plan", recipe)
+    assert status == 0
+    assert "the fixture has 8 slots: 2 fillings, each of the station time below" in " ".join(told.split())
 
 
 @each(

@@ -92,7 +92,7 @@ def next_lines(
 
 HEIGHT, WIDTH = 7, 100
 MOST_REMARKS = 4
-_POSED = {"force_x", "outer"}
+_POSED = {"force_x", "outer", "tilt"}
 """Columns of a reference: the outputs of its poses are no drift."""
 STYLES = ("cyan", "green", "magenta")
 
@@ -147,11 +147,12 @@ def next_of_recording(
 
 def _recognised(recording: RecordingDocument) -> None:
     rate = "" if recording["rate_hz"] is None else f", {recording['rate_hz']:.5g} Hz"
-    axes = ", ".join(recording["columns"][axis] for axis in "xyz")
+    axes = [axis for axis in "xyz" if axis in recording["columns"]]
+    columns = ", ".join(recording["columns"][axis] for axis in axes)
     rows = f"{recording['rows']} rows{rate}; {number_of(recording['dwells'], 'dwell')}"
     say(f"{', '.join(recording['files'])}: {recording['form']}, {rows}")
     say(
-        f"  x, y, z: {axes} ({recording['reason']}); in {recording['output_unit']}: {recording['output_reason']}",
+        f"  {', '.join(axes)}: {columns} ({recording['reason']}); in {recording['output_unit']}: {recording['output_reason']}",
         style="dim",
     )
     for text in [*recording["assumed"], *recording["remarks"]][:MOST_REMARKS]:

@@ -55,6 +55,15 @@ def test_a_figure_that_a_file_cannot_hold_is_said_once_and_fails_nothing(tmp_pat
     document = document_of(*words, status=0)
     assert document["verdict"] == "adequate"
     assert [one["figure"] for one in document["figures"] if not one["measured"]] == ["shock_bias_shift_ug"]
+    archive = words[-2:]
+    for command in (
+        ("diagnose", document["run"]),
+        ("fit", document["run"]),
+        ("export", document["run"]),
+    ):  # none leads to a fit
+        assert "a dynamic test was imported" in (told := refused(*command, *archive))
+        assert f"tumbleline show {document['run']} procedure_figures" in told
+        assert "'tumbleline fit" not in told
 
 
 def test_a_comparison_that_is_not_adequate_fails(tmp_path: Path) -> None:

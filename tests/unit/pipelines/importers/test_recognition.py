@@ -355,6 +355,24 @@ def test_two_levels_of_something_are_no_clock(rng: Rng, tmp_path: Path) -> None:
     assert recognise([csv(tmp_path / "a.csv", columns)]).guessed.column("time") == ""
 
 
+@each([("°C", "temperature"), ("°", ""), ("Hz", ""), ("mV/g", "")])
+def test_what_grows_in_another_unit_than_one_of_time_is_no_clock(told, rng: Rng, tmp_path: Path) -> None:
+    unit, meaning = told
+    means = pd.DataFrame(accelerations(rng, Hand(rng, stops=24).stops), columns=["x [g]", "y [g]", "z [g]"])
+    means.insert(0, f"T [{unit}]", 10.0 * np.arange(24))
+    means.to_csv(tmp_path / "a.csv", index=False)
+    assert recognise([tmp_path / "a.csv"]).guessed.columns[f"T [{unit}]"].meaning == meaning
+
+
+def test_a_day_beside_the_time_of_day_marks_no_dwells(rng: Rng, tmp_path: Path) -> None:
+    hand = Hand(rng)
+    stamps = pd.Timestamp("2026-03-02T23:59:30") + pd.to_timedelta(hand.time, unit="s")
+    columns = {"Datum": stamps.strftime("%d.%m.%Y"), "Uhrzeit": stamps.strftime("%H:%M:%S.%f")}
+    named(columns, "ax ay az", accelerations(rng, hand.force))
+    seen = recognise([csv(tmp_path / "a.csv", columns)])
+    assert (seen.guessed.column("time"), seen.guessed.column("dwell")) == ("Uhrzeit", "")
+
+
 IN_EXCHANGE_FORMAT = {
     "unit": "unit", "dwell": "dwell", "time": "time_s", "n": "n", "duration": "duration_s", "temperature": "unit_C",
     "slot": "slot", "outer": "outer_deg", "inner": "inner_deg", "since_move": "since_move_s", "since_power": "since_power_s",

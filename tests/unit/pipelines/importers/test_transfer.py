@@ -56,3 +56,11 @@ def test_a_file_without_units_or_values_is_refused(row: tuple[str, str, str], tm
     path.write_text(f"{head}\n{line}\n")
     with pytest.raises(DataRejected, match=needed):
         import_transfer(path, "S1", archive=str(tmp_path / "archive"))
+
+
+@each(["Sensitivity [mV/(m/s^2)]", "Empfindlichkeit [mV/ms-2]"])
+def test_a_sensitivity_per_m_s2_is_one_per_g_after_the_import(head: str, tmp_path: Path) -> None:
+    path = written(tmp_path / "b.csv")
+    path.write_text(path.read_text("utf-8").replace("magnitude", head, 1), encoding="utf-8")
+    done = import_transfer(path, "S1", archive=str(tmp_path / "archive"))
+    assert done["sensitivity"] == pytest.approx(0.3 * 9.80665, rel=2e-3)
