@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -232,7 +233,8 @@ def fit_transfer(
         return np.asarray(((residual(x + np.diag(steps)) - residual(x)) / ((x + steps) - x)[:, None]).T)
 
     def searched(start: Array, most: int) -> OptimizeResult:
-        return least_squares(residual, start, jac=slopes, bounds=bounds, max_nfev=most, x_scale="jac")
+        of_slopes: Any = slopes  # the stubs of scipy know the names of methods alone
+        return least_squares(residual, start, jac=of_slopes, bounds=bounds, max_nfev=most, x_scale="jac")
 
     level = float(np.log(np.median(np.abs(points.value[low_end]))))
 
