@@ -229,7 +229,7 @@ def fit_transfer(
         return np.clip(deviation(x) / error, -1e6, 1e6)
 
     def slopes(x: Array) -> Array:
-        steps = one_sided_steps(x, *bounds)
+        steps = _one_sided_steps(x, *bounds)
         return np.asarray(((residual(x + np.diag(steps)) - residual(x)) / ((x + steps) - x)[:, None]).T)
 
     def searched(start: Array, most: int) -> OptimizeResult:
@@ -271,7 +271,7 @@ def fit_transfer(
     )
 
 
-def one_sided_steps(x: Array, low: Array, high: Array) -> Array:
+def _one_sided_steps(x: Array, low: Array, high: Array) -> Array:
     """Steps (p,) of a slope by differences at ``x`` (p,): away from zero, and within the bounds (p,)."""
     steps = np.sqrt(EPSILON) * np.where(x >= 0.0, 1.0, -1.0) * np.maximum(1.0, np.abs(x))
     outside = (x + steps < low) | (x + steps > high)

@@ -302,9 +302,12 @@ def _one_thread() -> None:
 
 
 def _text_for_every_encoding() -> None:
-    """Let the streams write '?' for characters that their encoding lacks, as that of a pipe on Windows lacks '√'."""
+    """Let the streams write '?' for characters that their encoding lacks, as that of a pipe on Windows lacks '√'.
+
+    A stream that writes the bytes of names as they are, as in the C locale, stays so: its paths can be copied.
+    """
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
+        if isinstance(stream, TextIOWrapper) and stream.errors != "surrogateescape":
             stream.reconfigure(errors="replace")
 
 

@@ -137,6 +137,13 @@ def test_a_drive_without_an_edge_is_refused_as_that(tmp_path: Path) -> None:
     assert "one edge is needed; check the trigger" in refused(*step(tmp_path, np.ones(SIZE), np.zeros(SIZE)))
 
 
+def test_two_neighbours_of_a_step_that_depart_together_are_told(tmp_path: Path) -> None:
+    drive = np.where(TIME >= 0.02, 2.0, 0.0)
+    output = 0.05 * felt(drive, 900.0, 0.6)
+    output[1500:1502] += 0.05, 0.03
+    assert "a sample departs alone" in text_of(*step(tmp_path, drive, output), status=1)
+
+
 def sweep(folder: Path, head: str, *more: str, form: str = "", scatter: float = 1.0) -> tuple[str, ...]:
     """The words of the import of points of a sensor of 1500 Hz, a scale of 0.07 and a delay of 40 µs: 0.5 % and 0.3° a point.
 
