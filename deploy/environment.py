@@ -7,11 +7,13 @@ The makefile calls it with the Python that a person has, before any library is t
 import fcntl
 import hashlib
 import json
+import os
 import platform
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -25,6 +27,8 @@ UNREACHED = (
     r"(?:Retrying \(|Max retries exceeded|name resolution|[Cc]onnection ?(?:Error|refused|reset)|timed out"
     r"|from versions: none)"
 )
+MOST_PIPS = 4
+UNUSED = "/(?:tests?|pymavlink/dialects|sympy|moto|cfnlint)/"  # what is imported of them is compiled then
 COLLECTED = re.compile(r"^(?:Collecting|Processing) (\S+)", re.MULTILINE)
 FAILURES = (
     (
@@ -70,17 +74,17 @@ def set_up(name: str, folder: Path, *, asked: bool = False) -> None:
         return
     python = f"Python {platform.python_version()}"
     _say(
-        f"installing the libraries of {lock.name} into {folder.relative_to(ROOT)} with {python}: it takes about a minute"
+        f"installing the libraries of {lock.name} into {folder.relative_to(ROOT)} with {python}: it takes one to two minutes"
     )
     begun = time.monotonic()
     if not folder.is_dir():
         _create(folder)
     before = (folder / ".made").read_text(encoding="utf-8") if (folder / ".made").is_file() else None
     (folder / ".made").unlink(missing_ok=True)
-    wanted = [["--require-hashes", "-r", str(lock)]]
-    wanted += [] if name in OF_ANOTHER else [["--no-build-isolation", "--editable", str(ROOT)]]
-    for words in wanted:
-        _install(words, folder, lock, before)
+    with tempfile.TemporaryDirectory(dir=folder) as parts:
+        _install(_in_parts(lock, Path(parts)), folder, lock, before)
+    if name not in OF_ANOTHER:
+        _install([["--no-build-isolation", "--editable", str(ROOT)]], folder, lock, before)
     _compile(folder)
     for stamp in folder.glob(".*.lock"):  # another lock may have moved a version
         stamp.unlink()
@@ -145,23 +149,53 @@ def _create(folder: Path) -> None:
         raise NotSetUp(f"'{base} -m venv {folder}' failed: {' '.join(last)}; correct that and try again")
 
 
-def _install(words: list[str], folder: Path, lock: Path, before: str | None) -> None:
-    """Run pip; its output goes into a file. Without resolving: the lock is complete, and older pips stumble over its extras."""
+def _in_parts(lock: Path, folder: Path) -> list[list[str]]:
+    """Words for as many pips as there are processors, each with its part of the lock: a pip keeps one of them busy."""
+    entries = re.split(r"^(?=[A-Za-z0-9])", lock.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    count = min(os.cpu_count() or 1, MOST_PIPS, len(entries))
+    parts = [folder / f"{k}.lock" for k in range(count)]
+    for k, part in enumerate(parts):
+        part.write_text("".join(entries[k::count]), encoding="utf-8")
+    return [["--require-hashes", "-r", str(part)] for part in parts]
+
+
+def _install(parts: list[list[str]], folder: Path, lock: Path, before: str | None) -> None:
+    """Run a pip for each part, all at a time; their output goes into a file."""
     log = folder / "install.log"
-    options = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off", "--no-deps", "--no-compile"]
-    with log.open("w", encoding="utf-8") as out:
-        command = [folder / "bin" / "python", "-m", "pip", "install", *options, *words]
-        done = subprocess.run(command, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT, check=False)  # noqa: S603
-    if done.returncode:
-        text = log.read_text(encoding="utf-8", errors="replace")
-        if before is not None and done.returncode > 0 and "Installing collected packages" not in text:
+    failed, text = _pip(parts, folder)
+    if failed and len(parts) > 1 and not any(pattern.search(text) for pattern, *_ in FAILURES):
+        failed, text = _pip([["--require-hashes", "-r", str(lock)]], folder)  # they may have been in each other's way
+    log.write_text(text, encoding="utf-8")
+    if failed:
+        if before is not None and failed > 0 and "Installing collected packages" not in text:
             (folder / ".made").write_text(before, encoding="utf-8")  # nothing was changed: what was there still works
         raise NotSetUp(f"{reason(text, lock, folder)} (all that pip said: {log})")
 
 
+def _pip(parts: list[list[str]], folder: Path) -> tuple[int, str]:
+    """Exit status of one that failed, or zero, and what all of them said, those that failed last.
+
+    Without resolving: the lock is complete, and older pips stumble over its extras.
+    """
+    options = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off", "--no-deps", "--no-compile"]
+    running = []
+    for words in parts:
+        out = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - closed when it was read
+        command = [folder / "bin" / "python", "-m", "pip", "install", *options, *words]
+        running.append((subprocess.Popen(command, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT), out))  # noqa: S603
+    ended: list[tuple[int, str]] = []
+    for process, out in running:
+        status = process.wait()
+        with out:
+            out.seek(0)
+            ended.append((status, out.read().decode("utf-8", errors="replace")))
+    ended.sort(key=lambda end: end[0] != 0)
+    return ended[-1][0], "".join(text for _, text in ended)
+
+
 def _compile(folder: Path) -> None:
-    """Compile the libraries on all processors, without their tests, which nobody runs here: an eleventh of the size."""
-    compiled = ["-m", "compileall", "-qq", "-j", "0", "-x", "/tests?/", *folder.glob("lib/python3*/site-packages")]
+    """Compile the libraries on all processors, without what nobody runs here: tests, and most of some large ones."""
+    compiled = ["-m", "compileall", "-qq", "-j", "0", "-x", UNUSED, *folder.glob("lib/python3*/site-packages")]
     # a file that does not compile is for another version of Python: its library does not import it
     subprocess.run([folder / "bin" / "python", *compiled], stdout=subprocess.DEVNULL, check=False)  # noqa: S603
 

@@ -101,6 +101,7 @@ def test_a_copy_that_was_torn_is_completed_and_is_sound_at_any_point(
     assert content(copy.root) == content(archive.root)
 
 
+@pytest.mark.slow
 def test_a_copy_during_which_a_run_ends_is_sound(line, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     archive, copy = line
     names, listed = backup._names, list[str]()
@@ -132,6 +133,7 @@ def test_an_older_copy_restored_leaves_the_checkpoint_of_records_measured_since(
     assert state.is_file()
 
 
+@pytest.mark.slow
 def test_a_copy_of_another_archive_or_into_itself_is_refused(made: Path, tmp_path: Path) -> None:
     archive = Archive(made / "archive")
     finished_run(tmp_path, *BRIEF)

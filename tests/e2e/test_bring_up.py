@@ -150,6 +150,7 @@ def test_addresses_counted_from_one_are_found():
     assert found.findings.changes["temperature"]["address"] == 2819
 
 
+@pytest.mark.slow
 def test_a_wrong_scale_of_an_order_is_found_by_the_first_degree_and_nothing_else_is_ordered():
     name = own_profile("oriental_az", "my_axis", (
         'name = "target"\naddress = 0x5C\nmanual = "005Ch"\ntype = "int32"\nscale = 0.001',
@@ -187,6 +188,7 @@ def test_nothing_is_ordered_without_its_word_and_nobody_there_is_told():
         brought_up("oriental_az", 9, Scripted(), timeout_s=0.2)
 
 
+@pytest.mark.slow
 def test_a_device_that_answers_late_is_read_and_said_to_be_slow():
     with served_device("watlow_ez_zone") as (port, _):
         middle = Middle(port, late_s=0.5)

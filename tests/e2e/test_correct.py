@@ -223,6 +223,7 @@ def test_the_filters_are_those_of_scipy_and_of_the_exported_c_with_the_bias(
     assert np.max(np.abs(compiled(header, FILTERED_C, rows, home, "A1") - done[FORCES].to_numpy())) < 1e-10
 
 
+@pytest.mark.slow
 def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path, rng: np.random.Generator) -> None:
     table = tracked(run, rng)
     words = ("--set", "turn_on=2000", "--filter", "butterworth:12")
@@ -255,6 +256,7 @@ def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path,
     assert "are for format c" in refused(*export, "--format", "csv", "--set", "track=yes")
 
 
+@pytest.mark.slow
 def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path, rng: np.random.Generator) -> None:
     n = 3000
     turns = 2.0 * np.pi * np.cumsum(rng.normal(size=(n, 3)), axis=0) / 40.0

@@ -203,6 +203,7 @@ def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name
     assert after["fresh_rms_ug"] < 0.6 * before["fresh_rms_ug"]  # the day of the fresh run wanders, too
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_the_course_of_a_day_is_offered_with_its_period_and_leaves_no_more_than_the_noise(
     tmp_path: Path, capsys
@@ -226,6 +227,7 @@ def test_the_course_of_a_day_is_offered_with_its_period_and_leaves_no_more_than_
     assert after["rms_ug"] == pytest.approx(floor, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_an_effect_file_takes_part_and_the_lines_after_it_carry_it_and_dwells_left_out_and_run(
     humid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -271,6 +273,7 @@ def test_an_installed_package_takes_part(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert "damp" not in effects.catalogue()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_a_run_brings_its_history_and_its_own_model_unless_another_is_named(tmp_path: Path) -> None:
     plain = '"misalignment"]'
@@ -285,6 +288,7 @@ def test_a_run_brings_its_history_and_its_own_model_unless_another_is_named(tmp_
     assert "no run is called 'no-such-run'" in refused("diagnose", "no-such-run", *where)
 
 
+@pytest.mark.slow
 def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(tmp_path: Path) -> None:
     run, model = small_run(tmp_path, None, *AT_ROOM), tmp_path / "model.toml"
     own = json.dumps([*run.about["recipe"]["effects"], "curl"])

@@ -148,6 +148,7 @@ def test_the_demonstration_for_people_ends_with_a_command_that_runs(tmp_path: Pa
     assert (tmp_path / "few" / "discoveries.html").is_file()
 
 
+@pytest.mark.slow
 def test_what_no_effect_is_like_is_said_with_its_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the devices of one wafer the sensitive axis turns with the square of its load."""
 

@@ -64,6 +64,7 @@ def recorded_run(tmp_path_factory):
     return recipe, folder / "archive", frames
 
 
+@pytest.mark.slow
 def test_a_replayed_run_gives_the_same_tables_bit_for_bit(recorded_run, tmp_path):
     recipe, archive, frames = recorded_run
     first = Archive(archive).run("latest")

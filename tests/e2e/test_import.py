@@ -265,6 +265,7 @@ def test_settings_decide_what_a_dwell_is_a_stated_unit_is_taken_and_a_dead_axis_
     assert "add poses" not in told
 
 
+@pytest.mark.slow
 def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     rng = np.random.default_rng(7)
     time = np.arange(12_000) / 100.0

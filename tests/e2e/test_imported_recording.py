@@ -101,6 +101,7 @@ def table(run: str, name: str) -> pd.DataFrame:
     return Archive(None).run(run).table(name)
 
 
+@pytest.mark.slow
 def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate() -> None:
     first = imported(DRIFTING, 71, "--fit", "norm", "--device", "adxl357", status=1)
     assert "device: adxl357 is not one that the program knows; did you mean ADXL355?" in str(first["remarks"])
@@ -153,6 +154,7 @@ def test_a_bad_dwell_is_named_and_the_fit_without_it_is_a_run_of_its_own() -> No
     assert fitted["error"]["rms_ug"] == judged["error"]["rms_ug"]
 
 
+@pytest.mark.slow
 def test_angles_of_a_table_are_poses_for_a_fit_as_for_a_diagnosis() -> None:
     rng = np.random.default_rng(5)
     outer, inner = (
@@ -277,6 +279,7 @@ def test_a_statement_with_a_slip_or_without_a_day_is_refused(words: str) -> None
     assert words in refused(*hand_held(*stated, *more))
 
 
+@pytest.mark.slow
 def test_a_level_error_of_a_plate_is_named_where_the_headings_are_given() -> None:
     """24 placements on a plate that is 3 mrad and −2 mrad out of level: six faces, four headings each."""
     rng = np.random.default_rng(3)

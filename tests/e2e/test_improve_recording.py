@@ -69,6 +69,7 @@ def six_faces(rng: np.random.Generator, lean_deg: float) -> pd.DataFrame:
     return pd.DataFrame(output, columns=["acc_x", "acc_y", "acc_z"]).assign(time_s=np.arange(len(output)) / 100.0)
 
 
+@pytest.mark.slow
 def test_a_face_that_stands_askew_is_named_with_its_angle(rng: np.random.Generator) -> None:
     six_faces(rng, 5.0).to_csv("leans.csv", index=False)
     lines = document_of("improve", "leans.csv", status=1)["recording"]["lines"]
@@ -81,6 +82,7 @@ def test_a_face_that_stands_askew_is_named_with_its_angle(rng: np.random.Generat
     assert not any("CHECK" in line for line in document_of("improve", "stands.csv", status=1)["recording"]["lines"])
 
 
+@pytest.mark.slow
 def test_a_still_record_is_blocks_of_one_pose_without_the_hand_at_its_ends(rng: np.random.Generator) -> None:
     time = np.arange(0.0, 600.0, 0.05)
     warm = 40.0 - 0.04 * time
@@ -119,6 +121,7 @@ def test_a_doubt_and_too_few_positions_are_refused_with_what_to_add(rng: np.rand
     assert not Path("archive").exists()
 
 
+@pytest.mark.slow
 def test_six_faces_are_named_by_what_they_read_and_two_exchanged_labels_are_told(rng: np.random.Generator) -> None:
     faces = ["+x", "-x", "+y", "-y", "+z", "-z"]
     force = np.array([[float(f"{face[0]}1") * (face[1] == axis) for axis in "xyz"] for face in faces])

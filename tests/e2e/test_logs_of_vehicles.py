@@ -69,6 +69,7 @@ def robot(path: Path) -> None:
                 out.write_message("/state", other, {"text": "on"}, late, late)
 
 
+@pytest.mark.slow
 def test_a_recording_of_a_robot_becomes_a_model(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     robot(tmp_path / "imu.mcap")

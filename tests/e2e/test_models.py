@@ -156,6 +156,7 @@ def test_a_question_that_is_refused_or_not_answered_writes_nothing(
     assert "--yes" in terminal.UNATTENDED  # other questions keep their words
 
 
+@pytest.mark.slow
 def test_a_class_of_several_is_not_decided_by_yes_but_by_an_answer_or_a_name(
     alike: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

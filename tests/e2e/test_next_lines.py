@@ -236,6 +236,7 @@ def lagging() -> Run:
 pastable = pytest.mark.usefixtures("home", "no_next_measurement")
 
 
+@pytest.mark.slow
 @pastable
 def test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines(lagging: Run) -> None:
     written(

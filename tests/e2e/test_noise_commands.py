@@ -84,6 +84,7 @@ STATISTICS = {
 WITHOUT_INTERVAL = {"tie", "mtie"}
 
 
+@pytest.mark.slow
 @each(STATISTICS)
 def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have_one(
     statistic: str, record: Path, tmp_path: Path

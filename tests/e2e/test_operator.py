@@ -77,6 +77,7 @@ def test_seats_that_are_not_as_the_slot_map_says_are_asked_for_until_somebody_st
     assert "slot 0: 'A2' sits there, 'A1' is needed; slot 1: 'A1' sits there" in operator.asked[1].text
 
 
+@pytest.mark.slow
 def test_trouble_is_asked_about_and_the_run_goes_on_behind_its_last_record(tmp_path: Path) -> None:
     class Blocked(CaptureDouble):
         def __call__(self, job, records, progress):

@@ -132,6 +132,7 @@ def test_deployments_have_their_queue_and_are_found_by_their_module(line: Orches
     assert {one["job_variables"]["working_dir"] for one in deployments} == {str(ROOT)}
 
 
+@pytest.mark.slow
 def test_runs_whose_process_is_gone_are_closed_and_others_left_alone(line: Orchestrator) -> None:
     _, deployment = line.ask("/api/deployments/name/calibrate_lot/on-demand")
     _, elsewhere = line.ask("/api/deployments/name/audit_archive/weekly-audit")

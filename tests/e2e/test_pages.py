@@ -207,6 +207,7 @@ def test_the_reference_names_every_place_and_key_of_an_archive(tmp_path: Path) -
     assert {name for name in top if f"`{name}/" not in page} == set()
 
 
+@pytest.mark.slow
 def test_the_mapping_file_of_the_guide_to_imports_does_what_its_options_do(shared_data: Path, home: Path) -> None:
     page = "docs/how-to/import-your-data.md"
     (content,) = (block for block in pages.blocks(page, "toml") if "[columns]" in block)

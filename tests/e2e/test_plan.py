@@ -128,6 +128,7 @@ def test_the_error_of_a_verification_pose_is_planned_with_its_noise_and_limits_a
     )
 
 
+@pytest.mark.slow
 def test_wander_of_the_device_counts_beside_its_white_noise(faces: Path) -> None:
     quiet, restless = (planned(faces, "--device", name) for name in ("qa700", "adxl355"))
     assert restless["dwell_error_ug"]["wander"] == pytest.approx(0.664 * 300.0, rel=0.01)

@@ -85,6 +85,7 @@ def test_warm_up_begins_where_the_device_has_cooled_to_and_stress_goes_on_withou
     assert bias[1] - bias[0] == pytest.approx(expected, rel=0.2)
 
 
+@pytest.mark.slow
 def test_the_bias_after_a_power_on_differs_by_what_the_preset_says():
     repeats = 24
     overrides = {**QUIET, "bias_stability_ug": 2000.0}

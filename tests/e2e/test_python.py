@@ -102,6 +102,7 @@ def test_files_of_one_record_are_read_one_after_another(turned: pd.DataFrame, tm
         tl.read([paths[0], tmp_path / "absent.csv"])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_objects_draw_themselves_and_export_and_an_archive_is_tables(turned: pd.DataFrame, tmp_path: Path) -> None:
     kept = tmp_path / "archive"

@@ -103,6 +103,7 @@ def test_a_run_on_ramps_that_was_stopped_goes_on_to_the_same_tables(tmp_path, mo
     assert first.equals(second)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_recipe_on_ramps_with_its_bound(tmp_path):
     target = tmp_path / "quick.toml"
     page = tmp_path / "quick.html"

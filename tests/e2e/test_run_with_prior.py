@@ -55,6 +55,7 @@ def test_a_unit_whose_wafer_is_known_leans_on_it(tmp_path: Path) -> None:
     text_of("rerun", found["run"], "--archive", root, "--check")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_a_unit_that_does_not_fit_gets_the_full_plan(tmp_path: Path) -> None:
     recipe, root = with_prior(tmp_path), tmp_path / "archive"

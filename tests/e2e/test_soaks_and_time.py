@@ -81,6 +81,7 @@ def test_the_time_that_is_left_is_right_within_a_tenth_after_the_first_soak(temp
     assert all(b <= a for a, b in itertools.pairwise(soaking))  # it never runs up within a soak
 
 
+@pytest.mark.slow
 def test_a_station_that_is_slower_than_its_file_says_teaches_by_its_first_soak_and_records():
     config = station_of()
     wrong = config.model_copy(update={"pace": config.pace.model_copy(update={"ramp_K_per_min": 6.0})})

@@ -328,6 +328,7 @@ def mbpoll(port: int, device_id: int, address: int, kind: str, *more: str) -> li
     return [line.split("\t")[-1].strip() for line in done.stdout.splitlines() if line.startswith("[")]
 
 
+@pytest.mark.slow
 def test_a_client_of_another_maker_reads_what_the_profiles_say() -> None:
     with served_by_command("--speed", "20") as port:
         assert [int(word, 16) for word in mbpoll(port, 11, 0, "4:hex", "-c", "4")] == [0x5349, 0x4D30, 0x3030, 0x3000]

@@ -148,6 +148,7 @@ def test_check_drives_hardware_under_a_lease_and_leaves_it_safe(tmp_path):
     assert [line["event"] for line in machine_log(tmp_path / "state")] == ["driven", "left_safe"]
 
 
+@pytest.mark.slow
 def test_log_tells_why_a_run_was_paused_and_watch_draws_it(tmp_path):
     recipe = recipe_file(
         tmp_path,

@@ -80,6 +80,7 @@ def test_a_procedure_is_planned_measured_reported_and_says_what_it_lacks(recipe:
         assert given == (2 if words[0] == "diagnose" else 0)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_the_quickest_recipe_passes_and_its_next_lines_can_be_pasted(tmp_path: Path) -> None:
     assert (len(RECIPES), len(PROCEDURES), len(STATIONS)) >= (5, 12, 8)  # there is something to walk

@@ -188,6 +188,7 @@ def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state
             other.release()
 
 
+@pytest.mark.slow
 def test_leases_that_were_cleared_away_are_held_on_to_and_what_was_not_delivered_ends_with_its_connection(state):
     with driven() as (station, _, _):
         for path in (state / "leases").iterdir():

@@ -164,6 +164,7 @@ def test_one_radius_leaves_the_offset_open_and_says_what_closes_it(tmp_path: Pat
     assert abs(one.value - true) < 3.0 * one.uncertainty  # the station mounts at the radius of the recipe
 
 
+@pytest.mark.slow
 def test_a_capture_at_two_radii_that_stops_goes_on_bit_for_bit(tmp_path: Path) -> None:
     more = "radii_m = [0.5, 0.3]\n"
     for part in ("whole", "broken"):

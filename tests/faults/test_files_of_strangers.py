@@ -99,6 +99,7 @@ def test_a_number_or_a_quotient_in_an_ide_recording_is_read_as_before(tmp_path: 
     assert np.ptp(slow) == pytest.approx(2.0 * np.ptp(fast), rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_reader_that_never_returns_ends_at_its_time_of_the_processor() -> None:
     before = time.monotonic()
     with pytest.raises(DataRejected, match=r"a\.bin: not read after 1 s of the processor"):
@@ -154,6 +155,7 @@ def test_15_kb_of_gzip_with_millions_of_cells_are_refused_before_they_are_a_tabl
         files.content_here(path)
 
 
+@pytest.mark.slow
 def test_a_killed_reader_leaves_no_copy_of_a_recording(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("TMPDIR", str(tmp_path / "copies"))
     (tmp_path / "copies").mkdir()

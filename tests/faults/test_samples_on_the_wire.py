@@ -31,6 +31,7 @@ def captured(monkeypatch: pytest.MonkeyPatch, script) -> tuple[MemorySink, Memor
     return sink, events
 
 
+@pytest.mark.slow
 def test_a_slot_whose_answer_to_what_was_taken_is_lost_is_asked_and_keeps_its_unit(monkeypatch) -> None:
     lost: list[bytes] = []
 

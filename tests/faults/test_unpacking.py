@@ -115,6 +115,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
 
 
+@pytest.mark.slow
 def test_files_that_unpack_to_too_much_are_refused_in_little_memory(tmp_path: Path) -> None:
     paths = [tmp_path / f"{bomb.__name__}.csv" for bomb in (bomb_gzip, bomb_matlab, bomb_parquet, bomb_texts)]
     for path, bomb in zip(paths, (bomb_gzip, bomb_matlab, bomb_parquet, bomb_texts), strict=True):

@@ -70,6 +70,7 @@ def test_a_station_is_made_safe_though_no_note_of_it_can_be_kept(state, trouble)
                 time.sleep(0.1)
 
 
+@pytest.mark.slow
 def test_a_run_finds_its_watchdog_killed_starts_it_anew_and_is_watched():
     with served() as port:
         config = modbus_station(port, limits=SLOW)

@@ -92,6 +92,7 @@ def test_sine_fit_variances(rng: np.random.Generator) -> None:
     assert abs(sine_fit.fit_tone(record, 1000.0, 1.0).value[0]) == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_wrong_frequency_lowers_the_amplitude_and_the_fourth_parameter_repairs_it(rng: np.random.Generator) -> None:
     rate, f = 10_000.0, 1000.0
     t = np.arange(10_000) / rate

@@ -85,6 +85,19 @@ def test_an_environment_that_is_not_whole_is_known(tmp_path: Path, monkeypatch: 
     assert wrong_with(tmp_path / "good", asked=True).startswith("it has Python 3.99, ")
 
 
+def test_parts_of_a_lock_hold_each_library_once_with_its_hashes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    words = environment._in_parts(environment.ROOT / "requirements-run.lock", tmp_path)
+    parts = [Path(path).read_text(encoding="utf-8") for *_, path in words]
+    assert len(parts) == 3
+    entries = [entry for part in parts for entry in part.replace("\n    ", " ").splitlines()]
+    lines = (environment.ROOT / "requirements-run.lock").read_text(encoding="utf-8").replace("\n    ", " ").splitlines()
+    assert sorted(entries) == sorted(line for line in lines if not line.startswith("#"))
+    assert all("--hash=" in entry for entry in entries)
+
+
 @pytest.fixture
 def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A tree with a lock of one library, whose wheel lies in a folder; no network."""

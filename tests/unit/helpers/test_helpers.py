@@ -128,6 +128,7 @@ def test_last_of_its_module(of_the_module): ...
 """
 
 
+@pytest.mark.slow
 def test_each_test_that_leaves_something_open_is_named_and_no_other(tmp_path: Path) -> None:
     (tmp_path / "test_leaks.py").write_text(LEAKS, encoding="utf-8")
     options = ["-p", "left_open", "-p", "no:randomly", "-p", "no:cacheprovider", "-W", "error", "-q", "-rE"]

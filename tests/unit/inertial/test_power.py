@@ -119,6 +119,7 @@ def diagnosed(state: State, bias: np.ndarray, rng: np.random.Generator):
     return diagnose(lot, ["bias", "scale", "misalignment"], np.random.default_rng(1))
 
 
+@pytest.mark.slow
 def test_a_jump_of_the_bias_at_a_power_on_is_nothing_that_is_missing(rng):
     state = switched_off(run_of(), 600.0)
     jumps = 200e-6 * rng.standard_normal((3, 1)) * (np.arange(state.time.shape[-1]) >= 40)

@@ -84,6 +84,7 @@ def stepped(dwells, size_ug: float):
     return changed
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_random_walk_raises_the_sizes_that_are_named_and_the_document_says_so() -> None:
     quiet, loud = (make(World(units=2, poses=12, noise=Noise(flicker=5.0, walk=k)), 43_000_001) for k in (0.0, 4.0))

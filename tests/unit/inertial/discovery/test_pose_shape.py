@@ -31,6 +31,7 @@ def test_angles_are_those_of_the_table() -> None:
     assert force_from_angles(*np.radians(angles_of(2.0 * directions)).T) == pytest.approx(directions, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_map_is_a_function_of_degree_four_less_what_a_linear_model_takes() -> None:
     directions, share = sphere(8)
     function = directions[:, 0] ** 2 * directions[:, 1]

@@ -32,6 +32,7 @@ def test_the_diagnosis_names_one_of_a_pair_at_two_radii_whose_errors_are_unknown
     assert {hidden, RIVAL[hidden]} <= set(diagnose_spins(one, out, error).classes[0].effects)
 
 
+@pytest.mark.slow
 def test_errors_of_the_radii_alone_are_no_missing_effect() -> None:
     points = spins()
     verdicts, blind = [], []

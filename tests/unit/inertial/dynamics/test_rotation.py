@@ -214,6 +214,7 @@ def test_a_term_that_the_model_lacks_is_named_in_its_class(effect: str) -> None:
     assert not made.unexplained
 
 
+@pytest.mark.slow
 def test_one_rate_leaves_lag_and_hysteresis_together_and_a_second_one_parts_them() -> None:
     named = []
     for rates in ((RATE,), (RATE, 0.5 * RATE)):

@@ -9,6 +9,7 @@ from inertial.dynamics.step_record import aligned, step_figures
 from inertial.errors import NotIdentified
 
 
+@pytest.mark.slow
 def test_a_settling_time_near_the_edge_of_the_band_is_stated_only_where_it_is_right(rng: np.random.Generator) -> None:
     stated = wrong = 0
     for _ in range(250):

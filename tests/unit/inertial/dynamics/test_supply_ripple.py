@@ -9,6 +9,7 @@ RATE, COUNT = 4000.0, 8000
 TIME = np.arange(COUNT) / RATE
 
 
+@pytest.mark.slow
 def test_amplitudes_near_the_noise_are_right_on_average_in_power_and_their_error_is_that_of_draws() -> None:
     rng = np.random.default_rng(2)
     sigma = 1.0

@@ -74,6 +74,7 @@ def test_an_axis_that_wanders_by_itself_has_shares_of_its_own(seed: int) -> None
     assert own[1] + own[2] > 30.0 * max(noise.shares.flicker + noise.shares.walk, 1.0)
 
 
+@pytest.mark.slow
 def test_equal_axes_have_the_shares_of_their_lot() -> None:
     runs = [run_of(NULLS[name], SEED_OF_SHARES + seed) for name in ("B30", "K4", "white") for seed in range(2)]
     assert [run.model().noise.shares.by_block for run in runs] == [()] * 6

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.made_recordings import Recording, make
@@ -89,6 +90,7 @@ def test_a_run_with_temperature_that_the_model_lacks_is_noise_of_a_stated_size(r
     np.testing.assert_allclose(np.cov(whiten @ drawn.T), np.eye(12), atol=0.05)
 
 
+@pytest.mark.slow
 def test_biases_of_a_sensor_that_warms_hold_at_the_mean_temperature_of_its_dwells(rng: np.random.Generator) -> None:
     """20 stops in 140 s, one more on its feet at the end; a bias that warmed by 4 K passed for a walk, and z was off by 1 K."""
     off: list[float] = []

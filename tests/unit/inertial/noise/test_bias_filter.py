@@ -177,6 +177,7 @@ def test_a_record_and_its_allan_fit_state_the_error_of_the_bias(white: float, wa
     assert nees[0] < high  # white noise that no curve tells from none is stated at the least that one would tell
 
 
+@pytest.mark.slow
 def test_one_walk_for_all_channels_is_the_true_one_where_it_shows_and_none_where_there_is_none() -> None:
     rng = np.random.default_rng(77)
     walks = {0.0: [], 0.2: []}

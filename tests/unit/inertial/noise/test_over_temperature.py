@@ -42,6 +42,7 @@ def test_soaks_at_nearly_one_temperature_do_not_bend_the_curve() -> None:
     assert three.coefficients.size == 3
 
 
+@pytest.mark.slow
 def test_the_mean_of_many_records_holds_n_with_an_interval_that_shrinks_with_their_number() -> None:
     rng, rate, sigma = np.random.default_rng(8), 100.0, 3.0
     inside, widths = 0, {4: [], 25: []}

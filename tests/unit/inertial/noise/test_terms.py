@@ -90,6 +90,7 @@ def test_a_curve_that_no_mixture_explains_gives_ceilings_only(rng: np.random.Gen
     assert 1.0 < terms.high[0, terms.symbols.index("N")] * np.sqrt(rate) < 8.0
 
 
+@pytest.mark.slow
 def test_ceilings_hold_in_95_of_100_records_though_each_is_the_least_of_many() -> None:
     held = []
     for k in range(40):

@@ -23,6 +23,7 @@ def line(rng: np.random.Generator, *, crossed: bool = True, wafers: int = 40) ->
     return measured + noise, np.broadcast_to(ERROR, (*true.shape, P)), lot, wafer, measured
 
 
+@pytest.mark.slow
 def test_wafers_are_told_from_lots_and_priors_cover_new_units() -> None:
     rng, held, better, spreads = np.random.default_rng(21), [], [], []
     for _ in range(6):

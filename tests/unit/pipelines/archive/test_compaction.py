@@ -153,6 +153,7 @@ def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_pat
     assert known.folder("runs/line-1") is None
 
 
+@pytest.mark.slow
 def test_many_compactions_leave_few_packs_and_the_same_files(archive: Archive) -> None:
     compact(archive)
     run, serial = archive.run("latest").id, archive.run("latest").about["lot"]["units"][0]["serial"]

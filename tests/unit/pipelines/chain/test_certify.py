@@ -300,6 +300,7 @@ def test_an_edit_behind_a_signature_stops_show_and_export(
         assert "was edited after it was signed" in str(typed(*words).exception)
 
 
+@pytest.mark.slow
 def test_a_run_of_a_station_with_another_key_is_certified_where_that_key_is_trusted(
     tmp_path: Path, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

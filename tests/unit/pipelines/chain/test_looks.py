@@ -113,6 +113,7 @@ def test_a_unit_beyond_its_limit_is_told_once(run: Run, tmp_path: Path) -> None:
     assert told.text == "3 of 3 units decided"  # no U is compared with what is asked where every unit fails
 
 
+@pytest.mark.slow
 def test_a_unit_that_is_not_fitted_is_not_decided(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def one_refused(*given: Any) -> pd.DataFrame:
         verdicts = validate(*given)
@@ -156,6 +157,7 @@ def test_the_period_counts_from_dwells_as_long_as_they_were(run: Run) -> None:
     assert archived_terms(about) == chosen
 
 
+@pytest.mark.slow
 def test_a_model_that_is_not_adequate_keeps_the_lot_going(run: Run, tmp_path: Path) -> None:
     """Misalignment of milliradians that the model lacks: its U is small, and means nothing."""
     job = job_of(tmp_path, 800.0)

@@ -199,6 +199,7 @@ def test_a_demonstration_keeps_the_model_of_the_one_before(tmp_path: Path) -> No
     assert demo._put_aside(tmp_path / "model.toml") is None
 
 
+@pytest.mark.slow
 def test_a_closed_stream_is_no_defect_and_no_verdict() -> None:
     for closed, words, status in (
         (">&-", "plan keys names --json", 0),

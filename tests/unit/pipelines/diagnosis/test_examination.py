@@ -101,6 +101,7 @@ def test_swapped_units_and_a_truncated_file_are_known(rng):
     assert faults == {("units_swapped", "U001"), ("units_swapped", "U003")}
 
 
+@pytest.mark.slow
 def test_a_unit_without_some_dwells_is_diagnosed_by_those_it_has(rng):
     table = lots.lot(rng, hidden=lambda f, t, s, r: r.normal(0.0, 60e-6, 3) * f**3)
     count = (table["unit"] == "U000").sum()

@@ -105,6 +105,7 @@ def test_a_state_that_is_gone_or_edited_is_made_again(archive: Archive, caplog: 
         assert "was edited" in caplog.text
 
 
+@pytest.mark.slow
 def test_edited_scores_are_made_again_and_a_damaged_run_is_told_and_pooled_once_it_is_restored(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -168,6 +169,7 @@ def test_attributes_that_come_later_start_with_the_lots_after_them(archive: Arch
     assert len(nights(archive)) == 1
 
 
+@pytest.mark.slow
 def test_two_populations_in_a_coefficient_are_told_with_their_means(
     archive: Archive, monkeypatch: pytest.MonkeyPatch
 ) -> None:

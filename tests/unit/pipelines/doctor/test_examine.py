@@ -337,6 +337,7 @@ def test_this_environment_meets_the_requirements() -> None:
     assert "docs" not in checks["optional parts"].found  # builds the pages of the product, which its users read
 
 
+@pytest.mark.slow
 @each([("numpy", "1.0", "numpy", "fault"), ("click", None, "click", "fault"), ("numpy", "99.0", "lock", "warning")])
 def test_a_library_that_is_missing_or_of_another_version_is_named(
     case: tuple[str, str | None, str, str], monkeypatch: pytest.MonkeyPatch

@@ -56,6 +56,7 @@ def test_sensitivity_is_that_at_the_reference_frequency_with_its_sign_and_the_re
     assert one.sensitivity < 0.0
 
 
+@pytest.mark.slow
 def test_a_response_that_the_template_cannot_hold_has_no_transfer_function_and_the_text_says_why() -> None:
     r = F / 960.0
     h = resonant(F, 2200.0, 0.8, 1e6) / (1.0 - r**2 + 1j * np.sqrt(2.0) * r)

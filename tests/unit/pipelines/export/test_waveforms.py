@@ -97,6 +97,7 @@ def test_a_file_without_unit_or_sample_interval_is_refused(tmp_path: Path, rng: 
     assert not (tmp_path / "a").exists() or not Archive(str(tmp_path / "a")).runs()
 
 
+@pytest.mark.slow
 def test_dwells_and_steps_of_others_are_imported_by_the_command(tmp_path: Path, rng: np.random.Generator) -> None:
     paths = []
     for k, frequency in enumerate(np.geomspace(20.0, 4000.0, 8)):

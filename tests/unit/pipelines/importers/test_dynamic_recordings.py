@@ -39,6 +39,7 @@ def written(path: Path, x, y, rng, noise_V):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [swept, shaken])
 def test_one_file_of_a_sweep_or_of_random_vibration_is_recognised_and_identified(motion, tmp_path, rng):
     x = motion(rng)

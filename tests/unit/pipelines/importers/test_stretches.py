@@ -11,6 +11,7 @@ def kept(output: np.ndarray, rate_hz: float, gravity: float | None) -> int:
     return len(stretches.found_stops(output, np.arange(len(output)) / rate_hz, [0, len(output)], gravity).found)
 
 
+@pytest.mark.slow
 def test_a_rest_beside_a_machine_is_a_rest_and_a_hand_in_motion_is_none_in_any_unit() -> None:
     rng, t = np.random.default_rng(4), np.arange(0.0, 20.0, 1e-3)
     machine = np.array([0.0, 0.0, 1.0]) + 0.1 * np.sin(2.0 * np.pi * 50.0 * t)[:, None] * [0.6, 0.5, 0.6]

@@ -39,6 +39,7 @@ def judged(rows: pd.DataFrame) -> TransferDiagnosis:
 WARM = {"other_temperatures_C": [-40.0, 85.0]}
 
 
+@pytest.mark.slow
 def test_damping_that_follows_the_viscosity_of_its_gas_is_recognised_and_its_share_is_right() -> None:
     found = judged(swept({"kind": "gas_film", "figures": {"vented": 0.0, "gap_um": 50.0, "share": 0.8}}, **WARM))
     assert found.adequate is False
@@ -70,6 +71,7 @@ def test_a_vented_film_is_recognised_by_the_pressure() -> None:
     assert found.extended.of("gap_um")[0] == pytest.approx(2.0, rel=0.3)
 
 
+@pytest.mark.slow
 def test_units_whose_air_changes_nothing_have_an_adequate_model() -> None:
     found = judged(swept(None, pressures_hPa=[300.0], other_temperatures_C=[85.0]))
     assert found.adequate is True

@@ -1,6 +1,7 @@
 """Warm-up time on a simulated station whose devices have nearly no noise: nothing of the station moves it."""
 
 import numpy as np
+import pytest
 from procedure_records import procedure_records
 from small_station import captured, lot_of, short_recipe, station_of
 
@@ -12,6 +13,7 @@ QUIET = {"noise_density_ug": 0.5, "bias_instability_ug": 0.0, "rate_random_walk_
 PART = {"kind": "warm_up", "band_ug": BAND_UG, "off_s": 1200.0, "lasting_s": 1200.0, "scale": 0.007}
 
 
+@pytest.mark.slow
 def test_temperature_switching_and_start_of_the_record_do_not_move_the_warm_up_time() -> None:
     hidden = {"kind": "warm_up", "figures": {"size": SIZE_G, "tau": TAU_S}}
     station = station_of(preset_overrides=QUIET, hidden=[hidden], seed=3)

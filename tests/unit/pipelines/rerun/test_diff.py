@@ -70,6 +70,7 @@ def test_another_model_is_named_and_changes_stand_against_both_uncertainties(run
     assert ratios == sorted(ratios, reverse=True)  # the largest against uncertainty first
 
 
+@pytest.mark.slow
 def test_a_fresh_measurement_differs_by_its_data_and_runs_without_a_common_unit_are_refused(
     run: Run, larger: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

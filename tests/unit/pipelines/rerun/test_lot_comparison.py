@@ -91,6 +91,7 @@ def test_what_a_fit_hands_on_is_what_its_tables_hold(run: Run, more: tuple[str, 
         pd.testing.assert_frame_equal(verified[name], own, check_exact=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [(), ("level_error",), ("thermal_lag",)], ids=["own", "station", "nonlinear"])
 def test_a_lot_with_gaps_is_decided_in_memory_as_by_its_tables(
     run: Run, given: tuple[ArchivedJob, BudgetTables, BudgetTerms], more: tuple[str, ...]

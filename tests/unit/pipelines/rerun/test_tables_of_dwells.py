@@ -101,6 +101,7 @@ def test_a_curve_over_temperature_that_the_model_has_is_no_noise() -> None:
     assert 0.6 < np.std(ratios) < 1.5  # three deviations of 36 values
 
 
+@pytest.mark.slow
 def test_a_bad_dwell_of_one_unit_is_left_out_of_it_alone(tmp_path: Path) -> None:
     """As a diagnosis advises: the other units keep theirs, and their coefficients."""
     dwells = table(np.random.default_rng(5))

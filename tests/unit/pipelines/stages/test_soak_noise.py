@@ -94,6 +94,7 @@ def test_noise_that_grows_is_told_with_its_ratio_on_every_axis() -> None:
     assert np.all(np.abs(soaks["curve"] / (DENSITY * np.exp(0.006 * (soaks["temperature_C"] - 25.0))) - 1.0) < 0.15)
 
 
+@pytest.mark.slow
 def test_noise_that_stays_is_told_to_stay() -> None:
     named = [soak_noise(*run_of(0.0, seed=seed))["noise_temperature"]["verdict"] for seed in range(20, 24)]
     assert pd.concat(named).unique().tolist() == [SAME]

@@ -81,6 +81,7 @@ def test_a_jump_in_one_channel_leaves_limits_there_and_terms_elsewhere(calibrati
     assert others["identified"].all()
 
 
+@pytest.mark.slow
 def test_the_known_tempco_of_a_drifting_room_is_taken_out_of_a_record_and_told(calibration: dict) -> None:
     rng = np.random.default_rng(5_150_904)
     n = 36_000

@@ -133,6 +133,7 @@ def cubic_lot(folder: Path) -> WorkbenchSettings:
     return settings_of(folder / "archive", folder)
 
 
+@pytest.mark.slow
 def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_the_change_of_coefficients(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -174,6 +175,7 @@ def test_the_u_of_a_difference_is_that_of_the_larger_model_and_of_models_beside_
         assert _worded(row, sides)["difference"] == with_uncertainty(1.0, expanded)
 
 
+@pytest.mark.slow
 def test_two_runs_stand_side_by_side_with_k_of_the_first_and_imports_of_two_files_are_two_measurements(
     tmp_path: Path,
 ) -> None:

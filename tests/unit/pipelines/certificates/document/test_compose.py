@@ -129,6 +129,7 @@ def test_a_certificate_has_the_same_bytes_again_and_none_is_made_of_what_has_or_
     assert re.search(r"certificate A1/1 of run .* was revoked \(dropped\)", refused(*typed("A1")))
 
 
+@pytest.mark.slow
 def test_an_amendment_an_accreditation_and_an_interval_that_the_customer_agreed_to_are_on_paper_and_not_without_them(
     run: Run, xml: bytes, paper: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -267,6 +268,7 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
     assert statuses == ["beforeAdjustment", "afterAdjustment"]
 
 
+@pytest.mark.slow
 def test_a_long_serial_and_three_pages_of_coefficients_stay_on_the_paper(c: CertificateContent) -> None:
     serial = "S" + "0123456789ABCDEF" * 3 + "0123456789ABCDE"
     rows = tuple(
