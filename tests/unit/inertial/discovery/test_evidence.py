@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial.discovery.evidence import ALL, INSIDE, SLOPE, Evidence, ScoredLot
 from inertial.discovery.running_sums import FIRST, Levels, Scale, Sums
@@ -135,7 +136,7 @@ FOUND: dict[str, Change] = {
 }
 
 
-@pytest.mark.parametrize("driver", FOUND)
+@pytest.mark.parametrize("driver", mostly_slow(FOUND, "mean", f"wafer{INSIDE}", "station", "firmware"))
 def test_what_is_hidden_is_found_by_its_driver(driver: str) -> None:
     made = evidence_of(lots(5, 400, FOUND[driver]))
     assert float(made.drivers[driver].log_e[2]) > NEEDED

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from scipy import signal
 
 from inertial.dynamics.pulse_faults import lone_samples
@@ -23,7 +24,7 @@ def pulse(rng: np.random.Generator) -> tuple[np.ndarray, float, float]:
 
 
 @pytest.mark.parametrize("together", [1, 2])
-@pytest.mark.parametrize("block", range(3))
+@pytest.mark.parametrize("block", mostly_slow(range(3), 0))
 def test_a_sample_that_is_off_is_found_and_nothing_else_is(block: int, together: int) -> None:
     missed, false = [], []
     for k in range(60):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from scipy import signal
 
 from inertial.dynamics.pulse_faults import flat_top, other_pulses
@@ -19,7 +20,7 @@ def pulse(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float, floa
     return t, felt[1] / np.max(np.abs(felt[1])), duration, 10.0 ** float(rng.uniform(-4.0, -2.0))
 
 
-@pytest.mark.parametrize("block", range(3))
+@pytest.mark.parametrize("block", mostly_slow(range(3), 0))
 def test_a_cut_top_is_found_and_a_round_one_is_none(block: int) -> None:
     missed, false = [], []
     for k in range(60):
@@ -32,7 +33,7 @@ def test_a_cut_top_is_found_and_a_round_one_is_none(block: int) -> None:
     assert np.mean(missed) < 0.1
 
 
-@pytest.mark.parametrize("block", range(3))
+@pytest.mark.parametrize("block", mostly_slow(range(3), 0))
 def test_a_rebound_is_found_and_a_ringing_is_none(block: int) -> None:
     missed, false = [], []
     for k in range(60):
