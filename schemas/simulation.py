@@ -2,13 +2,17 @@
 
 from typing import Annotated, Any
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
-from schemas.bounds import Celsius, NotNegative, Number, Seed
+from schemas.bounds import Celsius, NotNegative, Number, Seconds, Seed
 from schemas.fault import FaultOrder
 from schemas.strict import Strict
 
-Bounds = tuple[Number, Number]
+
+def _ordered(bounds: tuple[float, float]) -> tuple[float, float]:
+    if bounds[0] > bounds[1]:
+        raise ValueError(f"{bounds[0]:g} is above {bounds[1]:g}; give the lower bound first")
+    return bounds
 
 
 class Hidden(Strict):
@@ -61,7 +65,7 @@ class Simulation(Strict):
     room_C: Celsius = 23.0
     local_gravity_m_s2: Annotated[Number, Field(gt=9.7, lt=9.9)] = 9.80665
     slot_rotation_mrad: NotNegative = 1.0
-    slot_lag_s: Bounds = (90.0, 200.0)
+    slot_lag_s: Annotated[tuple[Seconds, Seconds], AfterValidator(_ordered)] = (90.0, 200.0)
     slot_gradient_K: NotNegative = 0.1
     supply_spread: NotNegative = 1e-3
     supply_drift: NotNegative = 1e-4

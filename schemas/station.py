@@ -130,6 +130,16 @@ class StationConfig(Grown):
         return self
 
     @model_validator(mode="after")
+    def _two_drives(self) -> "StationConfig":
+        outer, inner = self.devices.outer, self.devices.inner
+        if outer == inner:
+            raise ValueError(
+                f"devices.inner: the same profile and address as devices.outer (device_id {inner.device_id}), so that one drive "
+                "would get the orders of both axes; give it its own device_id or address"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _complete(self) -> "StationConfig":
         if self.kind == "simulated" and self.simulation is None:
             raise ValueError("simulation: missing, a station of kind simulated needs it; add [simulation]")

@@ -143,7 +143,7 @@ def add_file(path: str | Path) -> list[str]:
     sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # whatever a user's file raises is reported with the file's name
+    except (Exception, SystemExit) as error:  # whatever a user's file raises is reported with the file's name
         raise BrokenEffect(f"effect file {source}: {raised_in(source, error)}; mend the file") from error
     checked_classes(module, source)
     known = dict(catalogue())

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from inertial.arrays import Array
-from inertial.effects.base import Effect, SensorEffect, StationEffect
+from inertial.effects.base import Effect, Nonlinear, SensorEffect, StationEffect
 from inertial.errors import BrokenEffect, InertialError
 
 NEEDED = ("id", "symbol", "equation", "source", "typical_ug", "breaker")
@@ -42,12 +42,29 @@ def checked_classes(module: ModuleType, source: Path) -> None:
             methods.append("names")
         if methods:
             raise BrokenEffect(f"{where}: no method {' and no method '.join(methods)}, it is needed; define it")
+        for parameter in item.nonlinear:
+            _refuse_parameter(parameter, where)
         for name in METHODS:
             if name in vars(item):
                 setattr(item, name, _guarded(vars(item)[name], where, source))
 
 
-def raised_in(source: Path, error: Exception) -> str:
+def _refuse_parameter(parameter: object, where: str) -> None:
+    """Refuse what is no nonlinear parameter, and bounds that no search can begin from."""
+    if not isinstance(parameter, Nonlinear):
+        raise BrokenEffect(
+            f"{where}: nonlinear holds {parameter!r}, a Nonlinear is needed; give its name, unit and bounds"
+        )
+    low, high = parameter.low, parameter.high
+    if not parameter.choices and not (low < high and (low > 0.0 or parameter.scale == "linear")):
+        above_zero = "" if parameter.scale == "linear" else f", both above zero for scale {parameter.scale}"
+        raise BrokenEffect(
+            f"{where}: nonlinear {parameter.name}: bounds {low:g} and {high:g}, the lower one is needed first{above_zero}; "
+            "correct them"
+        )
+
+
+def raised_in(source: Path, error: BaseException) -> str:
     """An exception of a user's file, with the line of the file where it was raised."""
     if isinstance(error, SyntaxError):
         return f"line {error.lineno}: SyntaxError: {error.msg}"
@@ -101,5 +118,10 @@ def _shaped(made: Any, needed: tuple[int, ...], where: str, method: str) -> Arra
         raise BrokenEffect(
             f"{where}: {method} returned {found}, shape {needed} is needed (…, {what}; as many as names gives); "
             "inertial.effects.base.stack makes it"
+        )
+    if not np.isfinite(values).all():
+        raise BrokenEffect(
+            f"{where}: {method} returned values that are not finite, finite numbers are needed at every dwell and between all "
+            "bounds of its parameters; mend the file"
         )
     return values if values.shape == shape else np.broadcast_to(values, shape)

@@ -88,6 +88,11 @@ class Archive:
             )
         self._refuse_other_format()
 
+    def refuse_misnamed(self, given: str | None) -> None:
+        """Refuse a root that somebody named and that holds no archive; the usual folder has none before the first run."""
+        if given is not None or self.root.is_dir():
+            self.refuse_none()
+
     def open_run(self, name: str, about: Mapping[str, Any], decisive: object) -> Run:
         """The run of this name and of the hash of what decides its result; it is created where it does not exist.
 

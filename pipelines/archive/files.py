@@ -23,7 +23,10 @@ from schemas.errors import ArchiveUnusable
 TEMPORARY = ".tmp-"
 WAITING = 8  # files written at the same time
 
-IN_ARCHIVE = "give another with --archive DIR or TUMBLELINE_ARCHIVE"
+IN_ARCHIVE = (
+    "give this user the right to write and make room, or name a copy ('tumbleline archive backup') or another archive with "
+    "--archive DIR or TUMBLELINE_ARCHIVE"
+)
 ELSEWHERE = "name another place"
 
 

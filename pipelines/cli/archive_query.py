@@ -35,7 +35,9 @@ def query(
     from pipelines.audit.sql import ask
 
     printed = is_standard_output(output, "archive query", as_json=as_json)
-    answer = ask(Archive(archive), sql, compact=compact)
+    store = Archive(archive)
+    store.refuse_misnamed(archive)
+    answer = ask(store, sql, compact=compact)
     if output is not None:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")

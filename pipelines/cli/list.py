@@ -15,8 +15,7 @@ EXAMPLES = ("tumbleline list", "tumbleline list --json")
 def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """List the runs of the archive in the order of their start. Exit status 1: files of a finished run are missing."""
     store = Archive(archive)
-    if archive is not None or store.root.is_dir():  # before the first run there is no archive, and nothing is wrong
-        store.refuse_none()
+    store.refuse_misnamed(archive)
     infos = store.runs()
     for name in store.without_start({info.id for info in infos}):
         remark(f"list: folder runs/{name} has no run.json; restore it from a copy, see 'tumbleline verify'")

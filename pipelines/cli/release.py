@@ -54,6 +54,7 @@ def model(
     from pipelines.rerun.selection import moment
 
     store = Archive(archive)
+    store.refuse_misnamed(archive)
     if file is None and not (since or device or station or reason or force):
         _list(store, as_json=as_json)
         return

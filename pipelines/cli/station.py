@@ -91,7 +91,9 @@ def log(
     as_json: options.JsonOption = False,
 ) -> None:
     """Show events that paused or ended runs (from the archive) and events of stations (from the log of this computer)."""
-    recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
+    store = Archive(archive)
+    store.refuse_misnamed(archive)
+    recorded = [*_of_runs(store, run), *([] if run else _of_machine())]
     events = [event for event in recorded if everything or event["kind"] not in QUIET]
     events = sorted(events, key=lambda event: event["when"])[-last:]
     give({"events": events}, _print, as_json=as_json)

@@ -25,7 +25,8 @@ PROMETHEUS = "prometheus"
 def monitor(
     archive: ArchiveOption = None,
     queue: Annotated[
-        list[str] | None, option("--queue NAME", "A queue that must have a worker online; may be repeated.")
+        list[str] | None,
+        option("--queue NAME", "A queue of PREFECT_API_URL that must have a worker online; may be repeated."),
     ] = None,
     days: Annotated[int, option("--last N", "Number of days before now whose runs are counted.", min=1, max=3650)] = 30,
     free_gb: Annotated[float, option("--free-gb GB", "Free space that the archive needs.", min=0.0)] = 1.0,
@@ -55,6 +56,7 @@ def monitor(
     changes nothing. Its numbers contain no serial number.
     """
     from pipelines.monitoring.exposition import text
+    from pipelines.monitoring.queue_numbers import configured
     from pipelines.monitoring.snapshot import Monitor
 
     address = webhook or os.environ.get("TUMBLELINE_WEBHOOK", "")
@@ -62,6 +64,11 @@ def monitor(
         raise WrongUse("monitor: --webhook posts while the service runs, --port is needed; give it too")
     if form not in {"", PROMETHEUS}:
         raise WrongUse(f"monitor: --format {shown(form)}, {PROMETHEUS} is needed; correct it, or leave it out")
+    if queue and not configured():
+        raise WrongUse(
+            f"monitor: --queue {shown(queue[0])}, PREFECT_API_URL is not set, so that no queue is watched; set it to the address "
+            "of the server, or leave --queue out"
+        )
     watched = Monitor(Archive(archive), days, free_gb, tuple(queue or ()))
     if port is not None:
         from pipelines.monitoring.alerts import Poster

@@ -95,6 +95,8 @@ def series_of_file(
         recognised = (
             f"recognised: time '{shown(time)}' in {time_unit}, {listed} in {unit or 'an unknown unit'}; else --map"
         )
+    if rate_hz is not None:
+        recognised = "; ".join(filter(None, [recognised, *_lost(table.drop(columns=chosen))]))
     values = np.stack([finite_column(table, name, path.name) for name in chosen])
     _refuse_clock(chosen, values, path.name, named=bool(columns), timed=bool(time))
     rate = rate_hz or _rate(_seconds(table, time, time_unit, path.name), path.name)
@@ -165,6 +167,22 @@ def _refuse_clock(names: Sequence[str], values: Array, where: str, *, named: boo
                 f"{where}: column '{shown(name)}' rises in every row (from {column[0]:g} to {column[-1]:g}) as a time or a "
                 f"counter does, the output of a sensor at rest is needed; {instead}name the channels with --map"
             )
+
+
+def _lost(table: pd.DataFrame) -> list[str]:
+    """What the counters among columns that are no output say of lost samples; their steps back, to zero, are passed over."""
+    told: list[str] = []
+    for name in table.columns[[pd.api.types.is_numeric_dtype(kind) for kind in table.dtypes]]:
+        steps = np.diff(table[name].to_numpy(dtype=np.float64))
+        if steps.size < FEWEST_STEPS or np.median(steps) != 1.0 or np.any(steps % 1.0):
+            continue
+        over = steps[steps >= 0.0] - 1.0  # a stamp that is late is followed by a shorter step, and nothing is lost
+        if (lost := int(over.sum())) > 0:
+            told.append(
+                f"{lost} samples are lost at {np.count_nonzero(over > 0.0)} places by '{shown(str(name))}', and the record is "
+                "taken as one without gaps; cut it there if they are many"
+            )
+    return told
 
 
 def _seconds(table: pd.DataFrame, name: str, unit: str, where: str) -> Array:

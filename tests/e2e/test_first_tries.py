@@ -58,6 +58,14 @@ BROKEN = {
         "stack(state, [state.force[..., axis] ** 2])", "state.force", "columns returned shape",
     ),
     "nothing": ("stack(state, [state.force[..., axis] ** 2])", "None", "columns returned NoneType"),
+    "not finite": ("axis] ** 2", "axis] * np.nan", "columns returned values that are not finite"),
+    "exit": ("import numpy as np", "raise SystemExit(3)", "line 2: SystemExit: 3"),
+    "parameter": ('"other poses"', '"other poses"\n    nonlinear = (3,)', "nonlinear holds 3, a Nonlinear is needed"),
+    "bounds": (
+        '"other poses"',
+        '"other poses"\n    from inertial.effects import Nonlinear\n    nonlinear = (Nonlinear("t", "s", 9.0, 1.0),)',
+        "nonlinear t: bounds 9 and 1, the lower one is needed first, both above zero",
+    ),
     "syntax": ("def names(self, axis):", "def names(self, axis", "line 15: SyntaxError"),
 }  # fmt: skip
 

@@ -123,6 +123,10 @@ def test_a_wrong_name_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_tol
     assert "after row 700 the time steps by 0.02 s" in refused(
         "noise", "allan", tmp_path / "gap.csv", "--map", "time=t"
     )
+    counted = table.assign(t=np.arange(len(table)) % 256).drop(index=[700, 701, 3000])
+    counted.to_csv(tmp_path / "lost.csv", index=False)
+    (note,) = document_of("noise", "psd", tmp_path / "lost.csv", "--rate", 100, "--map", "ax")["notes"]
+    assert note.startswith("3 samples are lost at 2 places by 't'")
     table.assign(ay=1.0).to_csv(tmp_path / "dead.csv", index=False)
     dead = ("noise", "allan", tmp_path / "dead.csv", "--map", "time=t")
     assert document_of(*dead)["notes"] == ["ay: the output never changes"]

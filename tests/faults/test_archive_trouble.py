@@ -259,5 +259,6 @@ def test_a_name_that_no_run_has_and_a_place_without_an_archive_are_told(tmp_path
         assert "and 55 more" in message
     (tmp_path / "other").mkdir()
     for place in (tmp_path / "other", tmp_path / "none"):
-        for command in ("list", "audit", "verify", "discover"):
-            refused("holds no archive, one with runs is needed", command, "--archive", place)
+        for command in ("list", "audit", "verify", "discover", "release", "station log", "archive query SELECT/**/1"):
+            refused("holds no archive, one with runs is needed", *command.split(), "--archive", place)
+    refused("so that no queue is watched", "station", "monitor", "--queue", "line-1", "--archive", store.root)

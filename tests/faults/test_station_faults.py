@@ -109,6 +109,8 @@ def test_a_state_of_another_lot_is_refused():
     [
         ("name = 'x'\nkind = 'simulated'\n[limts]\n", "limits"),
         ("name = 'x'\nkind =", "not valid TOML"),
+        (SIMULATED.replace("device_id = 2", "device_id = 1"), "one drive would get the orders of both axes"),
+        (SIMULATED.replace("seed = 1", "slot_lag_s = [200.0, 90.0]"), "'simulation.slot_lag_s': 200 is above 90"),
         (
             SIMULATED.partition("[uncertainty")[0].replace('kind = "simulated"', 'kind = "modbus"'),
             r"devices\.outer\.host",
