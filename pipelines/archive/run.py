@@ -34,6 +34,8 @@ def names_in(folder: Place) -> set[str]:
 
 
 START = "run.json"
+OF_LIMITS = ("budget", "budget_covariance", "figures", "grades", "lot_risks", "uncertainties")
+"""Tables that a fit of an import makes only against limits."""
 
 
 def lost_files(folder: Place, names: set[str]) -> list[str]:
@@ -168,9 +170,12 @@ class Run:
         if name not in tables.TABLES:
             raise WrongUse(f"archive: no table is called '{name}'; {did_you_mean(name, tables.TABLES)}")
         if self.about.get("lot") and not self.about.get("capture") and not path.is_file():
+            there, limits = self.tables(), " --limits FILE" if name in OF_LIMITS else ""
+            made = f"which a fit of its dwells makes; fit it with 'tumbleline fit {self.id}{limits}' and name that run"
+            known = "dwells" not in there or ("coefficients" in there and not limits)
             raise ArchiveUnusable(
-                f"archive: run {self.id} was imported and has no table '{name}', which a fit of its dwells makes; fit it with "
-                f"'tumbleline fit {self.id}' and name that run"
+                f"archive: run {self.id} was imported and has no table '{name}'{'; it has ' if known else ', '}"
+                f"{', '.join(there) if known else made}"
             )
         return read_table(path, name, self.manifest(name)["sha256"] if path.is_file() else None, columns)
 

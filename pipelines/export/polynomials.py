@@ -149,6 +149,16 @@ def refuse_fewer_axes(units: Sequence[UnitCalibration], what: str) -> None:
             )
 
 
+def refuse_equal_names(units: Sequence[UnitCalibration], names: Sequence[str], language: str) -> None:
+    """Refuse two units whose serial numbers become one name in the language of the file."""
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise WrongUse(
+                f"export: units {units[names.index(name)].unit} and {units[k].unit} are both {name} in {language}, different "
+                "names are needed; export them one by one with --units"
+            )
+
+
 UNGRADED = "no limits"
 """The outcome of a unit that was fitted and compared with no limits: that of an import."""
 

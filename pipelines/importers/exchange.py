@@ -88,15 +88,21 @@ def history_of_run(run: Run) -> pd.DataFrame:
 def refuse_other_procedures(run: Run, wanted: str) -> None:
     """Refuse a run of other procedures than the multi-position test, of which alone ``wanted`` come; says what it has instead."""
     kinds = [part["kind"] for part in (run.about.get("recipe") or {}).get("procedures", ())]
-    imported = not kinds and "procedure_figures" in (tables := run.tables()) and "dwells" not in tables
+    imported = not kinds and "procedure_findings" in (tables := run.tables()) and "dwells" not in tables
     if not imported and (not kinds or "multi_position" in kinds):
         return
     found = "a dynamic test was imported" if imported else f"it measured {', '.join(dict.fromkeys(kinds))}"
+    points = imported and "procedure_figures" not in run.tables()
+    shown = (
+        "points: 'tumbleline show {0} procedure_points'"
+        if points
+        else "figures: 'tumbleline show {0} procedure_figures'"
+    )
     remedy = "import one" if imported else "list it in a recipe's procedures and measure"
     raise WrongUse(
         f"run {run.id} has no {wanted}: {found}, and they come from the multi-position test; {remedy}. What this run found, "
         "and whether the models of its procedures are adequate: "
-        f"'tumbleline show {run.id} procedure_findings'; its figures: 'tumbleline show {run.id} procedure_figures'"
+        f"'tumbleline show {run.id} procedure_findings'; its {shown.format(run.id)}"
     )
 
 

@@ -40,6 +40,8 @@ _SLOWEST_HZ = 200.0
 _PULSE = 0.2
 """Part of the time beyond a tenth of the largest excursion, below which a motion is a shock: of a sine it is 0.94, of random
 vibration 0.6."""
+_BETWEEN = 0.05
+"""Part of the samples between the two levels, up to which a drive is a step: of a sine 0.6 are."""
 
 
 @dataclass(frozen=True)
@@ -213,11 +215,12 @@ def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: floa
     reference = driven[0]
     output = next(name for name in free if name != reference)
     motion = measurable(values.as_numbers(content.table[reference], reference))
-    procedure = "shock" if _lasting(motion) < _PULSE else "sweep"
     names = list(guessed.columns)
     pairs = [("time", guessed.column("time")), ("reference", reference), ("z", output)]
     mapped = ",".join(f"{what}={names.index(name) + 1}" for what, name in pairs if name)
     units = {name: content.units.get(name, "") or unit_in(name) for name in (output, reference)}
+    volts = units[reference] in {"V", "mV"} and _is_step(motion)
+    procedure = "step_response" if volts else "shock" if _lasting(motion) < _PULSE else "sweep"
     missing = [(what, name) for what, name in (("output", output), ("reference", reference)) if not units[name]]
     stated = [f"{what}=UNIT" for what, _ in missing]
     if guessed.time_unit.meaning and not content.units.get(guessed.column("time"), ""):
@@ -230,6 +233,12 @@ def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: floa
         open_.append(f"the scale of column '{output}': a file SHOCK.toml with the line scale = … (output per g)")
     words += ["--units", serial_of(path)]
     return _DynamicGuess(shlex.join(words), reference, output, open_)
+
+
+def _is_step(wave: Array) -> bool:
+    """Whether a drive is at one of two levels in nearly all samples."""
+    low, high = np.nanmin(wave), np.nanmax(wave)
+    return bool(np.nanmean(np.minimum(wave - low, high - wave) < 0.1 * (high - low)) > 1.0 - _BETWEEN)
 
 
 def _lasting(wave: Array) -> float:

@@ -17,7 +17,7 @@ from inertial.errors import InertialError
 from pipelines.importers import files
 from pipelines.importers.documents import TransferFailure, TransferImport, TransferParameter
 from pipelines.importers.keep import keep_tables, lot_of_import
-from pipelines.importers.transfer_columns import PointsLayout, transfer_points
+from pipelines.importers.transfer_columns import PointsLayout, output_of, transfer_points
 from pipelines.procedures import procedure_tables
 from pipelines.procedures.figures import Finding, Outcome
 from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text, model_texts
@@ -49,7 +49,8 @@ def import_transfer(
         if name not in EFFECTS:
             raise WrongUse(f"import: no effect '{name}' of transfer functions; {did_you_mean(name, EFFECTS)}")
     content, source = files.read_content(path)
-    points, recognised = transfer_points(content, path.name, layout or PointsLayout())
+    layout = layout or PointsLayout()
+    points, recognised = transfer_points(content, path.name, layout)
     try:
         diagnosis = diagnose_transfer(points, effects)
     except InertialError as problem:
@@ -66,13 +67,12 @@ def import_transfer(
     text = [
         *([("columns", recognised)] if recognised else []),
         *diagnosis_text(diagnosis),
-        *model_texts(diagnosis, points),
+        *model_texts(diagnosis, points, output_of(content, layout)),
     ]
     if diagnosis.adequate is False and adequate(fit_transfer(_as_radians(points), effects)):
         text.append(("phase", "taken as radians the same points agree with the model; add --unit-of phase=rad"))
     stated = {"procedure": "sweep", "effects": list(effects), "unit": unit}
-    if layout is not None:
-        stated |= {name: dict(value) for name, value in vars(layout).items() if value}
+    stated |= {name: dict(value) for name, value in vars(layout).items() if value}
     stated |= {"device": device} if device else {}
     about = {
         "name": f"transfer function of {unit}",

@@ -187,9 +187,13 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
     known = UNITS[meaning]
     unit = _plain(given or stated)
     if meaning == "magnitude":  # output in any unit per g, unless it is said to be a level, or per m/s²
-        per = re.search(r"/\s*\(?\s*(m.*?)[)\]\s]*$", given or stated or column)
-        if per and output_unit(per[1]) == "m/s^2":
+        if _per_m_s2(given or stated or column):
             return PER_M_S2
+        if given and _per_m_s2(stated or column):
+            raise WrongUse(
+                f"{where}: column '{shown(column)}' states a unit per m/s², --unit-of {meaning}={shown(given)} has "
+                "none; leave it out, or write the whole unit"
+            )
         return IN_DECIBEL if unit.lower().startswith(IN_DECIBEL.lower()) else LINEAR
     if unit not in known:
         what = f"unit '{shown(given or stated)}'" if given or stated else "no unit"
@@ -197,6 +201,20 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
             f"{where}: column '{shown(column)}' has {what}, one of {', '.join(known)} is needed; add --unit-of {meaning}=…"
         )
     return unit
+
+
+def _per_m_s2(unit: str) -> bool:
+    """Whether a unit, or the name of a column, ends with one per m/s²."""
+    per = re.search(r"/\s*\(?\s*(m.*?)[)\]\s]*$", unit)
+    return per is not None and output_unit(per[1]) == "m/s^2"
+
+
+def output_of(content: Content, layout: PointsLayout) -> str:
+    """The unit of the output of points, such as ``mV`` of mV/(m/s²); empty where none is stated, or another than of an output."""
+    column = _columns(content.table, layout).get("magnitude", "")
+    bracketed = re.search(r"[\[(](.+)[\])]$", column.strip())
+    stated = layout.units.get("magnitude", "") or content.units.get(column, "") or (bracketed[1] if bracketed else "")
+    return output_unit(stated.partition("/")[0])
 
 
 def _plain(unit: str) -> str:

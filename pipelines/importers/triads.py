@@ -44,6 +44,8 @@ _MOVES, _STILL = 0.6, 0.2
 _LEFT_OUT = 0.1
 _CLOSE = 0.1
 """Relative distance of the radius from gravity in a unit, at which a triad without a name for acceleration is one."""
+_EXACT = 1e-3
+"""Range of the size over it, up to which three columns may be the force of a table: its numbers have three decimals or more."""
 _CLEAR_COUNTS, _CLEAR_RATIO = 250.0, 30.0
 """Size of whole numbers at rest, and over their scatter: the bias of a gyroscope is smaller."""
 _MOST = 60
@@ -117,11 +119,15 @@ def triad(columns: Mapping[str, Array], units: Mapping[str, str]) -> Triad:
         for stem, names in usable.items()
         if _NAMED.search(stem) or output_unit(units.get(names[0], "")) in {"g", "mg", "m/s^2"}
     }
-    found = [(names, sphere_of(columns, names)) for names in stated.values()]
+    spheres = {names: sphere for names in usable.values() if (sphere := sphere_of(columns, names)) is not None}
+    found = [(names, spheres[names]) for names in stated.values() if names in spheres]
+    plain = [(names, sphere) for names, sphere in spheres.items() if not OTHER.search("".join(names))]
     if found:
-        return _one_of([(names, sphere) for names, sphere in found if sphere is not None], "its name")
-    plain = [(names, sphere_of(columns, names)) for names in usable.values() if not OTHER.search("".join(names))]
-    fits = [(names, sphere) for names, sphere in plain if sphere is not None and _shows_gravity(sphere, columns, names)]
+        beside = [pair for pair in plain if pair not in found and pair[1].fits] if _is_exact(columns, *found) else []
+        return _one_of(found + beside, "its name")
+    if stated:
+        return Triad()
+    fits = [(names, sphere) for names, sphere in plain if _shows_gravity(sphere, columns, names)]
     if fits:
         return _one_of(fits, "its name, and its size is that of gravity")
     dead = [names for names in groups.values() if _one_is_dead(columns, names, live)]
@@ -129,6 +135,12 @@ def triad(columns: Mapping[str, Array], units: Mapping[str, str]) -> Triad:
         return Triad(dead[0], "its name, though one of the three never changes", sphere_of(columns, dead[0]))
     free = [name for name in live if name not in of_other and not any(name in names for names in usable.values())]
     return _unnamed(columns, free, units)
+
+
+def _is_exact(columns: Mapping[str, Array], *found: tuple[tuple[str, ...], Sphere]) -> bool:
+    """Whether the only triad has one size in each of its poses, as the force of a table has, but hardly an output."""
+    size = np.linalg.norm(np.column_stack([columns[name] for name in found[0][0]]), axis=1)
+    return len(found) == 1 and found[0][1].fits and bool(np.ptp(size) < _EXACT * np.mean(size))
 
 
 def _unnamed(columns: Mapping[str, Array], free: Sequence[str], units: Mapping[str, str]) -> Triad:
@@ -155,7 +167,8 @@ def _one_of(found: Sequence[tuple[tuple[str, ...], Sphere]], reason: str) -> Tri
         return Triad()
     listed = "; ".join(", ".join(names) for names, _ in found[:4])
     return Triad(
-        doubt=f"{len(found)} groups of three columns may be an accelerometer ({listed}): choose one with --map"
+        sphere=found[0][1] if all(sphere.fits for _, sphere in found) else None,
+        doubt=f"{len(found)} groups of three columns may be an accelerometer ({listed}): choose one with --map",
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from pipelines.importers.documents import WaveformFigure, WaveformImport
 from pipelines.importers.files import digest_of
 from pipelines.importers.keep import keep_tables, lot_of_import
 from pipelines.importers.mapping import TIME_UNITS
+from pipelines.importers.stated_units import column_name
 from pipelines.importers.values import finite_column
 from pipelines.procedures import PROCEDURES, procedure_tables
 from pipelines.procedures.base import FromWaveforms, NominalScale
@@ -220,6 +221,13 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
     first, _, second = (piece.strip() for piece in layout.group.partition(","))
     content, source = files.read_content(path, first)
     other = files.read_content(path, second)[0] if second else content
+    of = {
+        meaning: other if meaning.startswith("reference") else content
+        for meaning in layout.columns
+        if meaning != "time"
+    }
+    named = {meaning: _named(layout.columns[meaning], channels) for meaning, channels in of.items()}
+    layout = replace(layout, columns={**layout.columns, **named})
     outputs = {axis: layout.columns[axis] for axis in AXES if axis in layout.columns}
     driven = "reference" in layout.columns
     if not outputs or (procedure.needs_reference and not driven):
@@ -252,6 +260,11 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
     return _Recording(samples, UnitRecord(drive_time, drive), text, source, content.remarks)
 
 
+def _named(column: str, content: Content) -> str:
+    """The name of a column that is given by its name or its number; as it is given where there is none."""
+    return column_name([*map(str, content.table.columns)], column) or column
+
+
 def _unit(content: Content, layout: RecordingLayout, meaning: str, column: str, where: str) -> str:
     """Unit of a channel: as stated by the command, else by the file; a unit that neither states is refused."""
     stated = content.units.get(column, "") or unit_in(column)
@@ -274,6 +287,7 @@ def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
     column = layout.columns.get("time") or next(
         (name for name in content.table.columns if name.partition("[")[0].strip().lower() in {"time", "x_value"}), ""
     )
+    column = _named(column, content)
     interval = content.interval_s
     if layout.rate_hz:
         interval = 1.0 / layout.rate_hz

@@ -232,8 +232,11 @@ TOO_GOOD_P = 1e-3
 """Probability of so small a χ² below which the stated uncertainties are told to be too large."""
 
 
-def model_texts(diagnosis: TransferDiagnosis, points: Points) -> list[tuple[str, str]]:
-    """Subject and text of the figures of a model with U (k = 2), of its polarity, and of uncertainties that are too large."""
+def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") -> list[tuple[str, str]]:
+    """Subject and text of the figures of a model with U (k = 2), of its polarity, and of uncertainties that are too large.
+
+    output : unit of the output, where it is stated
+    """
     fit, out = diagnosis.extended, list[tuple[str, str]]()
     if diagnosis.adequate is None:
         return out
@@ -247,7 +250,7 @@ def model_texts(diagnosis: TransferDiagnosis, points: Points) -> list[tuple[str,
     ]
     if known:
         size = with_uncertainty(fit.sensitivity, 2.0 * abs(fit.sensitivity) * fit.sensitivity_error)
-        out.append(("figures", f"sensitivity {size} per g, {', '.join(known)} (k = 2)"))
+        out.append(("figures", f"sensitivity {size}{f' {output}' if output else ''} per g, {', '.join(known)} (k = 2)"))
     if diagnosis.unexplained:
         out.append(("not determined", f"{', '.join(names)}: {values[0].note}"))
     elif not values[0].identified:  # of the parameters the diagnosis says it

@@ -117,10 +117,11 @@ def _static_method(run: Run, recipe: dict[str, Any], lengths: str) -> str:
     poses, checks = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
     verified = f"; verification in {checks} other poses" if checks else "; no pose was kept for verification"
     planned = len(recipe.get("temperatures_C") or [0])
+    lengths = lengths or str(recipe.get("dwell_s", ""))  # none where the means of the dwells were imported
     soaks = number_of(int(dwells["soak"].nunique()) if "soak" in dwells else planned, "temperature")
     return (
         f"Static multi-position calibration in the gravity of the Earth: {poses} poses at "
-        f"{soaks}, {lengths or recipe.get('dwell_s', 'unknown')} s per pose, recipe "
+        f"{soaks}, {f'{lengths} s per pose, ' if lengths else ''}recipe "
         f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ())).replace('_', ' ')}{verified}."
     )
 

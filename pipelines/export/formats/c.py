@@ -13,7 +13,7 @@ import numpy as np
 
 from pipelines.export.fixed_point import ONE, fixed_point
 from pipelines.export.omissions import comment, largest_error_ug
-from pipelines.export.polynomials import ORDER, UnitCalibration, refuse_fewer_axes
+from pipelines.export.polynomials import ORDER, UnitCalibration, refuse_equal_names, refuse_fewer_axes
 from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 from schemas.units import AXES
@@ -30,6 +30,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     """The header as text, in double or single precision or in fixed point (``--set arithmetic``)."""
     kind = settings.arithmetic
     fixed = kind == "q24"
+    refuse_equal_names(units, [_symbol(unit) for unit in units], "C")
     behind = bool(settings.firmware.low_pass or settings.firmware.bias)
     if behind:
         refuse_fewer_axes(units, "export: --filter or track")

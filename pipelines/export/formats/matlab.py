@@ -11,9 +11,8 @@ import numpy as np
 
 from inertial.arrays import Array
 from pipelines.export.omissions import ACROSS_T, SCALE, comment_lines
-from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.polynomials import UnitCalibration, refuse_equal_names
 from pipelines.export.settings import ExportSettings
-from schemas.errors import WrongUse
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
 
 NAME = "matlab"
@@ -38,12 +37,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     from scipy.io import savemat  # a third of a second
 
     names = [_variable(unit.unit) for unit in units]
-    for k, name in enumerate(names):
-        if name in names[:k]:
-            raise WrongUse(
-                f"export: units {units[names.index(name)].unit} and {units[k].unit} are both {name} in MATLAB, different "
-                "names are needed; export them one by one with --units"
-            )
+    refuse_equal_names(units, names, "MATLAB")
     content: dict[str, Any] = {name: _properties(unit, settings) for name, unit in zip(names, units, strict=True)}
     content["tumbleline"] = {
         "run": run,

@@ -314,8 +314,9 @@ def test_files_of_units_are_parted_and_never_share_a_name() -> None:
     ids = ExportSettings(nominal=NOMINAL, device_ids={"SN 1": 1, "SN_1": 2})
     with pytest.raises(WrongUse, match="two units have the file name"):
         export_files("px4", [one, other], "r", ids)
-    with pytest.raises(WrongUse, match="both SN_1 in MATLAB"):
-        export_files("matlab", [one, other], "r", ids)
+    for form, language in (("matlab", "MATLAB"), ("c", "C")):
+        with pytest.raises(WrongUse, match=f"both SN_1 in {language}, "):
+            export_files(form, [one, other], "r", ids)
     names = [f"{axis}{part}" for axis, part in product("XYZ", ("OFF", "SCALE"))]
     text = export_text("px4", [one], "r", ids)
     assert all(f"CAL_ACC0_{name}" in text for name in names)

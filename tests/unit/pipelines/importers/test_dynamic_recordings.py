@@ -12,7 +12,7 @@ from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 from schemas.errors import DataRejected, WrongUse
 
 RATE_HZ = 10_000.0
-COLUMNS = {"time": "time [s]", "reference": "ref [m/s^2]", "z": "out [V]"}
+COLUMNS = {"time": "1", "reference": "2", "z": "3"}  # as the printed command has them
 
 
 def second_order(x, natural_hz, damping, rate_hz):
@@ -91,6 +91,19 @@ def test_a_pulse_is_found_by_itself(duration_ms, tmp_path, rng):
     assert figures["shock_duration_ms"] == pytest.approx(duration_ms, rel=0.03)
     assert figures["shock_velocity_m_s"] == pytest.approx(2.0 * 480.0 * 9.80665 * 1e-3 * duration_ms / np.pi, rel=0.015)
     assert any(line.startswith("pulse: reference 4") for line in document["text"])
+
+
+def test_a_drive_in_volts_that_steps_is_proposed_as_a_step_response(tmp_path, rng):
+    drive = np.where(np.arange(4000) > 1000, 1.0, 0.0)
+    path = written(tmp_path / "step.csv", drive, second_order(drive, 200.0, 0.6, RATE_HZ), rng, 2e-4)
+    path.write_text(path.read_text().replace("ref [m/s^2]", "drive [V]"))
+    proposed = inspect([path]).document["command"]
+    assert "--procedure step_response --map time=1,reference=2,z=3" in proposed
+    document = import_waveforms(
+        [path], "step_response", None, "S1", RecordingLayout(COLUMNS, {}), str(tmp_path / "archive")
+    )
+    overshoot = next(one for one in document["figures"] if one["figure"] == "step_overshoot_percent")
+    assert overshoot["value"] == pytest.approx(100.0 * np.exp(-0.6 * np.pi / 0.8), abs=0.2)
 
 
 def test_a_sensor_alone_has_its_pulse_and_no_sensitivity_and_a_channel_that_no_test_reads_is_refused(tmp_path, rng):

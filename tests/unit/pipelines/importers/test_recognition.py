@@ -138,10 +138,10 @@ def telephone_export(rng: Rng, at: Path) -> Path:
     return csv(at / "a.csv", columns)
 
 
-def volts_beside_force(rng: Rng, at: Path) -> Path:
+def volts_beside_force(rng: Rng, at: Path, forces: str = "force_x force_y force_z") -> Path:
     """A bench: the force that was applied, in g and without noise, before the outputs in V."""
     true, columns = Hand(rng, stops=24).stops, {"step": np.arange(24.0)}
-    named(columns, "force_x force_y force_z", true)
+    named(columns, forces, true)
     named(columns, "out_x[V] out_y[V] out_z[V]", 0.66 * accelerations(rng, true))
     return csv(at / "a.csv", columns)
 
@@ -232,6 +232,11 @@ def drifting_voltages(rng: Rng, at: Path) -> Path:
     return at / "a.csv"
 
 
+def force_without_its_name(rng: Rng, at: Path) -> Path:
+    """Called like an output: the force of a table, whose size is one in all poses, before the outputs in V."""
+    return volts_beside_force(rng, at, "fx[g] fy[g] fz[g]")
+
+
 def deviations(rng: Rng, at: Path) -> Path:
     columns = {"time": np.arange(200.0) / 10.0}
     named(columns, "sd_x sd_y sd_z", 0.003 * (1.0 + 0.1 * rng.normal(size=(200, 3))))
@@ -247,6 +252,7 @@ SEALED = (
     weather,
     reference_alone,
     drifting_voltages,
+    force_without_its_name,
     deviations,
 )
 
@@ -281,6 +287,9 @@ def test_nothing_is_proposed_where_no_three_columns_are_one_accelerometer(
     assert axes_of(seen) == ""
     assert seen.open
     assert "x=COLUMN" in seen.import_command
+    if write is force_without_its_name:
+        assert "2 groups" in seen.open[0]
+        assert len(seen.open) == 1
 
 
 def test_the_reference_and_the_spread_of_a_table_of_means_are_recognised_by_their_names(

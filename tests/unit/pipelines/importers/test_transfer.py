@@ -9,7 +9,8 @@ from in_process import document_of
 from scipy import signal
 
 from pipelines.importers.transfer import import_transfer
-from schemas.errors import DataRejected
+from pipelines.importers.transfer_columns import PointsLayout
+from schemas.errors import DataRejected, WrongUse
 
 HEAD = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
 
@@ -64,3 +65,6 @@ def test_a_sensitivity_per_m_s2_is_one_per_g_after_the_import(head: str, tmp_pat
     path.write_text(path.read_text("utf-8").replace("magnitude", head, 1), encoding="utf-8")
     done = import_transfer(path, "S1", archive=str(tmp_path / "archive"))
     assert done["sensitivity"] == pytest.approx(0.3 * 9.80665, rel=2e-3)
+    assert any(" mV per g, " in line for line in done["text"])
+    with pytest.raises(WrongUse, match=r"--unit-of magnitude=mV has none; leave it out"):
+        import_transfer(path, "S1", archive=str(tmp_path / "archive"), layout=PointsLayout(units={"magnitude": "mV"}))

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from capture_double import AT_ROOM, small_run
 from in_process import document_of, refused
@@ -24,7 +25,7 @@ from pydantic import ValidationError
 from pipelines.archive import Archive, Run
 from pipelines.certificates import Ledger
 from pipelines.certificates.document import compose as composing
-from pipelines.certificates.document.circumstances import standard_of, traceability
+from pipelines.certificates.document.circumstances import _static_method, standard_of, traceability
 from pipelines.certificates.document.compose import compose
 from pipelines.certificates.document.content import CertificateContent, Coefficient, ReferenceStandard
 from pipelines.certificates.document.dcc import DCC, SI, dcc, validate
@@ -376,3 +377,13 @@ def test_the_certificate_states_the_verdict_with_p_what_u_does_not_contain_and_n
         assert sum(row[4] == "0.0 %" for row in table["rows"][start:end]) <= 1
     names = {row[0] for row in parts["Results"]["tables"][0]["rows"]}
     assert "error of the norm of gravity, verification (largest of the poses)" in names
+
+
+def test_the_method_states_the_time_of_a_pose_where_it_is_known() -> None:
+    dwells = pd.DataFrame({"kind": ["dwell"] * 3, "pose": range(3)})
+    run = SimpleNamespace(table=lambda _: dwells)
+    for known, said in (
+        ({"dwell_s": 10.0}, "3 poses at 1 temperature, 10.0 s per pose, recipe"),
+        ({}, "at 1 temperature, recipe"),
+    ):
+        assert said in _static_method(run, {"name": "import", "effects": ["bias"]} | known, "")
