@@ -43,6 +43,8 @@ ALIKE = {
 }  # fmt: skip
 NEEDED = ("frequency", "magnitude", "phase")
 UNCERTAINTIES = ("magnitude_uncertainty", "phase_uncertainty")
+COVERAGE = re.compile(r"[(\[,;]?\s*\bk\s*=\s*([1-9]\d*(?:\.\d+)?)\s*[)\]]?")
+"""Coverage factor in the name of a column of expanded uncertainties, as in ``U [%] (k = 2)``."""
 STATED = {"repeatability_percent": "magnitude_uncertainty", "repeatability_deg": "phase_uncertainty"}
 """Keys of a sweep that state the uncertainty of every point."""
 OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan, "pressure_hPa": np.nan}
@@ -120,6 +122,11 @@ def transfer_points(content: Content, name: str, layout: PointsLayout) -> tuple[
         )
     value = {meaning: _values(table, column, name, meaning, units[meaning]) for meaning, column in found.items()}
     value |= {
+        meaning: value[meaning] / float(factor[1])
+        for meaning, column in found.items()
+        if meaning in UNCERTAINTIES and (factor := COVERAGE.search(column))
+    }
+    value |= {
         meaning: np.full(len(table), size) for meaning, size in layout.every_point.items() if meaning not in found
     }
     other = {meaning: np.full(len(table), usual) for meaning, usual in OPTIONAL.items()}
@@ -183,7 +190,11 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
         there = did_you_mean(column, map(str, content.table.columns))
         raise DataRejected(f"{where}: column '{shown(column)}' of {meaning} is not there; {there}")
     ending = column.rpartition("_")[2] if "_" in column else ""
-    stated = content.units.get(column, "") or unit_in(column) or (ending if _plain(ending) in UNITS[meaning] else "")
+    stated = (
+        content.units.get(column, "")
+        or unit_in(COVERAGE.sub("", column))
+        or (ending if _plain(ending) in UNITS[meaning] else "")
+    )
     known = UNITS[meaning]
     unit = _plain(given or stated)
     if meaning == "magnitude":  # output in any unit per g, unless it is said to be a level, or per m/s²

@@ -3,13 +3,15 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from each import each
 from in_process import document_of
 from scipy import signal
 
+from pipelines.importers.content import Content
 from pipelines.importers.transfer import import_transfer
-from pipelines.importers.transfer_columns import PointsLayout
+from pipelines.importers.transfer_columns import PointsLayout, transfer_points
 from schemas.errors import DataRejected, WrongUse
 
 HEAD = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
@@ -68,3 +70,14 @@ def test_a_sensitivity_per_m_s2_is_one_per_g_after_the_import(head: str, tmp_pat
     assert any(" mV per g, " in line for line in done["text"])
     with pytest.raises(WrongUse, match=r"--unit-of magnitude=mV has none; leave it out"):
         import_transfer(path, "S1", archive=str(tmp_path / "archive"), layout=PointsLayout(units={"magnitude": "mV"}))
+
+
+@pytest.mark.parametrize("ending", [" (k=2)", ", k = 2.00"])
+def test_an_expanded_uncertainty_is_divided_by_the_factor_that_its_heading_states(ending: str, tmp_path: Path) -> None:
+    standard = pd.read_csv(written(tmp_path / "b.csv"))
+    u, v = HEAD.split(",")[3:]
+    expanded = standard.assign(**{u: 2.0 * standard[u], v: 2.0 * standard[v]})
+    expanded = expanded.rename(columns={u: f"U mag [%]{ending}", v: f"U phase [deg]{ending}"})
+    of = [transfer_points(Content(table), "b.csv", PointsLayout())[0] for table in (standard, expanded)]
+    assert np.allclose(of[1].magnitude_error, of[0].magnitude_error)
+    assert np.allclose(of[1].phase_error, of[0].phase_error)
