@@ -8,6 +8,7 @@ TESTS ?=
 # one more than processors: a worker waits a fifth of its time, for servers, watchdogs and browsers
 UV ?= uv
 WORKERS ?= $(shell expr $$(nproc) + 1)
+THREADS ?= $(shell nproc)  # of the type check
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export PREFECT_SERVER_ANALYTICS_ENABLED = false
@@ -21,7 +22,9 @@ export PYTHONS TESTS WORKERS
 run: $(VENV)/.run  ## set up and run the main job on the simulated station
 	$(BIN)/tumbleline run || [ $$? -eq 1 ]  # 1: the run is done and a unit missed its limits, which is a result
 
-test: check pytest  ## set up, lint, types, layers and tests
+# one thread of the type check beside the tests takes two thirds of the processor time of two before them
+test: lint layers  ## set up, lint, types, layers and tests
+	@$(MAKE) --no-print-directory -j 2 types pytest THREADS=1
 
 help:  ## what can be made
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
@@ -33,7 +36,7 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 
 types: $(VENV)/.dev
-	$(BIN)/pyright --threads $(shell nproc)
+	$(BIN)/pyright --threads $(THREADS)
 
 layers: $(VENV)/.dev
 	$(BIN)/lint-imports
