@@ -98,27 +98,33 @@ def test_parts_of_a_lock_hold_each_library_once_with_its_hashes(
     assert all("--hash=" in entry for entry in entries)
 
 
+def _wheel(folder: Path, name: str) -> str:
+    """The hash of a wheel of one module without content, which is written into a folder."""
+    module = name.replace("-", "_")
+    wheel, info = folder / f"{module}-1.0-py3-none-any.whl", f"{module}-1.0.dist-info"
+    texts = {
+        f"{module}.py": "",
+        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    record = "".join(f"{path},,\n" for path in [*texts, f"{info}/RECORD"])
+    with zipfile.ZipFile(wheel, "w") as file:
+        for path, text in {**texts, f"{info}/RECORD": record}.items():
+            file.writestr(path, text)
+    return hashlib.sha256(wheel.read_bytes()).hexdigest()
+
+
 @pytest.fixture
 def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A tree with a lock of one library, whose wheel lies in a folder; no network."""
+    """A tree with a lock of two libraries, whose wheels lie in a folder; no network."""
     monkeypatch.setattr(environment, "ROOT", tmp_path)
     for name in [name for name in os.environ if name.startswith("PIP_")]:
         monkeypatch.delenv(name)
     for name, value in {"CONFIG_FILE": os.devnull, "NO_INDEX": "1", "FIND_LINKS": str(tmp_path / "wheels")}.items():
         monkeypatch.setenv(f"PIP_{name}", value)
-    wheel = tmp_path / "wheels" / "tiny_one-1.0-py3-none-any.whl"
-    wheel.parent.mkdir()
-    texts = {
-        "tiny_one.py": "",
-        "tiny_one-1.0.dist-info/METADATA": "Metadata-Version: 2.1\nName: tiny-one\nVersion: 1.0\n",
-        "tiny_one-1.0.dist-info/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
-    }
-    record = "".join(f"{name},,\n" for name in [*texts, "tiny_one-1.0.dist-info/RECORD"])
-    with zipfile.ZipFile(wheel, "w") as file:
-        for name, text in {**texts, "tiny_one-1.0.dist-info/RECORD": record}.items():
-            file.writestr(name, text)
-    value = hashlib.sha256(wheel.read_bytes()).hexdigest()
-    (tmp_path / "requirements-crate.lock").write_text(f"tiny-one==1.0 --hash=sha256:{value}\n", encoding="utf-8")
+    (tmp_path / "wheels").mkdir()
+    lines = [f"{name}==1.0 --hash=sha256:{_wheel(tmp_path / 'wheels', name)}\n" for name in ("tiny-one", "tiny-two")]
+    (tmp_path / "requirements-crate.lock").write_text("".join(lines), encoding="utf-8")
     (tmp_path / "pyproject.toml").write_text("", encoding="utf-8")
     return tmp_path
 
@@ -129,9 +135,9 @@ def test_an_environment_is_made_completed_and_then_left_alone(tree: Path, capsys
     set_up("crate", folder)
     first, last = capsys.readouterr().out.splitlines()
     assert "installing the libraries of requirements-crate.lock into .venv with Python 3" in first
-    assert "about a minute" in first
+    assert "one to two minutes" in first
     assert last.startswith("set-up: installed in ")
-    assert subprocess.run([folder / "bin" / "python", "-c", "import tiny_one"], check=False).returncode == 0
+    assert subprocess.run([folder / "bin" / "python", "-c", "import tiny_one, tiny_two"], check=False).returncode == 0
     set_up("crate", folder)
     assert capsys.readouterr().out == ""
 
