@@ -113,12 +113,8 @@ def family_names() -> list[str]:
 def simulated(profile: Profile, *of: object) -> Any:
     """The simulated controller with a profile, of a world and, for a drive, its axis: its bank, or its line device."""
     if profile.adapter not in family_names():
-        known = did_you_mean(profile.adapter, family_names())
-        raise RecipeInvalid(
-            f"profile {profile.name}: no adapter '{profile.adapter}' is simulated; {known}; a new one needs "
-            f"stations/plant/families/{profile.adapter}.py",
-            key="adapter",
-        )
+        cure = f"{did_you_mean(profile.adapter, family_names())} (or add stations/plant/families/{profile.adapter}.py)"
+        raise RecipeInvalid(f"profile {profile.name}: no simulated '{profile.adapter}'; {cure}", key="adapter")
     return import_module(f"{families.__name__}.{profile.adapter}").simulated(*of, profile)
 
 

@@ -52,7 +52,9 @@ def test_a_command_is_in_the_help_and_the_documents_and_explains_itself_and_ever
         assert leaf.help, leaf.name
         texts = {p.name: getattr(p, "help", None) for p in leaf.params}
         assert [name for name, text in texts.items() if not text] == [], leaf.name
-        assert [text for text in (leaf.help, *texts.values()) if re.search(r"\[[a-z/]+\]", text)] == []  # it is lost as markup
+        assert [
+            text for text in (leaf.help, *texts.values()) if re.search(r"\[[a-z/]+\]", text)
+        ] == []  # it is lost as markup
 
 
 @each(COMMANDS)
