@@ -49,6 +49,7 @@ SLIPS: list[tuple[tuple[str, ...], str]] = [  # words of a command, and what is 
     (("export", "nosuch"), "holds no archive, one with runs is needed"),
     (("rerun", "all", "--check", "--effects", "bias"), "--check with another model or limits has no stored result"),
     (("export", "--format", "hex"), "no format is called 'hex'"),
+    (("export", "--format", "c", "--json"), "--json prints coefficients, --format c is another form"),
 ]  # fmt: skip
 
 
