@@ -29,6 +29,7 @@ Adapter = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]  # the family, a m
 WORDS: dict[str, int] = {"uint16": 1, "int16": 1, "uint32": 2, "int32": 2, "float32": 2, "string": 1, "bit": 1}
 BITS: frozenset[str] = frozenset({"coil", "discrete"})
 READ_ONLY: frozenset[str] = frozenset({"input", "discrete"})
+UNCONVERTED = ("degF", "°F", "F", "K")  # temperatures are taken as degC
 ADDRESSES = 65536
 LONGEST_WRITE = 123  # registers in one FC16 request (Modbus Application Protocol 1.1b3, 6.12)
 
@@ -180,6 +181,12 @@ class Profile(Strict):
             raise ValueError(
                 f"links {carriers}: a device on ascii or visa has commands alone, any other registers alone; correct it"
             )
+        for entry in (*self.registers, *self.commands):
+            low, high = limits_of(entry)
+            if low > high:
+                raise ValueError(f"{entry.name}: minimum {low:g} is above maximum {high:g}; exchange or correct them")
+            if entry.unit in UNCONVERTED:
+                raise ValueError(f"{entry.name}: unit {entry.unit}, degC is needed; set the controller to Celsius")
         _refuse_overlaps(self)
         for register in self.registers:
             if register.scaled_by:

@@ -84,7 +84,7 @@ class Archive:
         if not (self.root / "archive.json").is_file():
             raise ArchiveUnusable(
                 f"archive: folder '{self.root}' holds no archive, one with runs is needed; name it with --archive or "
-                "TUMBLELINE_ARCHIVE"
+                "TUMBLELINE_ARCHIVE, or make one with 'tumbleline run'"
             )
         self._refuse_other_format()
 
@@ -150,6 +150,7 @@ class Archive:
             if or_unit:
                 message = f"{where}: '{name}' is no run, and no unit with a certificate; {self.units_like(name, close) or hint}"
         else:
+            self.refuse_none()
             message = f"{where}: there is no run yet; make one with 'tumbleline run'"
         raise WrongUse(message)
 

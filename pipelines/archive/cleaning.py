@@ -119,10 +119,7 @@ def _seal(archive: Archive, done: Cleaned) -> None:
 
 def _anchor(archive: Archive, done: Cleaned) -> None:
     """Add calibrations to the chain that are missing there."""
-    known: set[str] = set()
-    for _, path in hash_chain.entries(archive.root):
-        if path.is_file():
-            known |= files.read_json(path)["files"].keys()
+    known = hash_chain.sealed_names(archive.root)
     left = [name for name in _calibrations(archive.root) if name not in known]
     for start in range(0, len(left), AT_ONCE):
         part = {name: files.sha256(archive.root / name) for name in left[start : start + AT_ONCE]}

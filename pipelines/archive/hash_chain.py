@@ -57,6 +57,11 @@ def entries(root: Place) -> Iterator[tuple[int, Place]]:
         yield number, path_of_entry(root, number)
 
 
+def sealed_names(root: Place) -> set[str]:
+    """The files, by their path below the archive's root, that an entry seals."""
+    return {name for _, path in entries(root) if path.is_file() for name in files.read_json(path)["files"]}
+
+
 def name_of_entry(number: int) -> str:
     """Name of an entry's file, below the root of the archive."""
     return f"{FOLDER}/{number // SHARD:06d}/{number:09d}.json"

@@ -139,6 +139,11 @@ class Ledger:
             sealed = {path: files.sha256(self.root / path) for path in sorted(paths)}
             hash_chain.append(self.root, "calibrations", sealed, {**provenance(), "run": events[0].run})
 
+    def unanchored(self, events: Sequence[LedgerEntry]) -> list[LedgerEntry]:
+        """Those of some events that no entry of the chain has: their writer was killed."""
+        known = hash_chain.sealed_names(self.root) if events else ()
+        return [event for event in events if self._name(event.serial, event.sequence) not in known]
+
     def write_bulk(self, events: Iterable[LedgerEntry]) -> int:
         """Write the events of a new archive together, without reading old events or a sync for each file; return their number.
 

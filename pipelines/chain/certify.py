@@ -117,7 +117,7 @@ def certify(  # noqa: PLR0913 - each is an option of the command
         for proposal in proposals:
             event, was_there = ledger.add(proposal, supersede=supersede, amend=meant)
             (result.there if was_there else result.written).append(event)
-        ledger.anchor(result.written)
+        ledger.anchor([*result.written, *ledger.unanchored(result.there)])
     return result
 
 

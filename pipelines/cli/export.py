@@ -114,14 +114,13 @@ def command(
     from pipelines.export.teds import data_sheet
     from pipelines.jobs.model_files import use_formulas_of
 
+    if as_json and (waveforms is not None or form not in {"", "json"}):
+        other = "--waveforms writes files" if waveforms is not None else f"--format {form} is another form"
+        raise WrongUse(f"export: --json prints coefficients, {other}, one is possible; leave one out")
     if waveforms is not None:
-        if as_json:
-            raise WrongUse(
-                "export: --json prints coefficients, --waveforms writes files, one is possible; leave one out"
-            )
         write_record(Archive(archive).run(run), waveforms, units, form or "csv", output)
         return
-    form = "json" if as_json or not form else form
+    form = form or "json"
     given = settings(setting, SETTINGS, "export")
     if form not in FORMATS:
         raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")

@@ -17,7 +17,7 @@ ENDING = "-ordered"
 
 
 def order(
-    recipe: Annotated[str, argument("RECIPE", "Recipe with a table [stop].")],
+    recipe: Annotated[str, argument("RECIPE", "Recipe with a table 'stop'.")],
     output: Annotated[
         list[Path] | None,
         option("--output -o FILE", "The new recipe (.toml; - prints it; NAME-ordered.toml by default)."),
@@ -28,8 +28,8 @@ def order(
 ) -> None:
     """Write a recipe with its soaks and poses in the order with which its units are known first.
 
-    Nothing is added or left out. The minutes are those until the uncertainties of [stop] are reached, expected with the noise of
-    the device's preset; limits and visible effects are not part of them, and may let the lot go on for longer.
+    Nothing is added or left out. The minutes are those until the uncertainties of its table 'stop' are reached, expected with the
+    noise of the device's preset; limits and visible effects are not part of them, and may let the lot go on for longer.
     """
     from inertial.design import local_names, split
     from pipelines.archive import files

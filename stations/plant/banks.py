@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Protocol
 
+from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.profile import Profile
 from schemas.station_devices import Device, Devices
 from stations.codec import NotEncodable, Value
@@ -112,10 +113,8 @@ def family_names() -> list[str]:
 def simulated(profile: Profile, *of: object) -> Any:
     """The simulated controller with a profile, of a world and, for a drive, its axis: its bank, or its line device."""
     if profile.adapter not in family_names():
-        raise LookupError(
-            f"profile {profile.name}: no simulation of family {profile.adapter}, one is needed; add "
-            f"stations/plant/families/{profile.adapter}.py with a function 'simulated'"
-        )
+        cure = f"{did_you_mean(profile.adapter, family_names())} (or add stations/plant/families/{profile.adapter}.py)"
+        raise RecipeInvalid(f"profile {profile.name}: no simulated '{profile.adapter}'; {cure}", key="adapter")
     return import_module(f"{families.__name__}.{profile.adapter}").simulated(*of, profile)
 
 

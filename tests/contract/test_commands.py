@@ -50,7 +50,11 @@ def test_a_command_is_in_the_help_and_the_documents_and_explains_itself_and_ever
     assert (module.__doc__ or "").startswith(f"``tumbleline {name}``: ")
     for leaf in leaves(get_command(app).get_command(None, name)._load()):
         assert leaf.help, leaf.name
-        assert [p.name for p in leaf.params if not getattr(p, "help", None)] == [], leaf.name
+        texts = {p.name: getattr(p, "help", None) for p in leaf.params}
+        assert [name for name, text in texts.items() if not text] == [], leaf.name
+        assert [
+            text for text in (leaf.help, *texts.values()) if re.search(r"\[[a-z/]+\]", text)
+        ] == []  # it is lost as markup
 
 
 @each(COMMANDS)

@@ -184,7 +184,9 @@ def test_an_unknown_family_and_one_without_its_simulation_or_its_adapter_are_nam
         adapter_of(load_profile("acme"), "chamber", ThermalChamber)
     added(product, "acme", ENABLE, ADAPTER)
     assert set(adapters()) != set(family_names())  # what the contract above compares
-    with pytest.raises(LookupError, match=r"stations/plant/families/acme\.py"):
+    with pytest.raises(
+        RecipeInvalid, match=r"known: .*stations/plant/families/acme\.py|did you mean .*families/acme\.py"
+    ):
         make_plant(station_with(chamber="acme"), lot_of(1))
     sys.modules.pop(f"{families.__name__}.acme")
     added(product, "acme", ENABLE, "from stations.devices.chamber import ThermalChamber\n# none of its own\n")

@@ -112,6 +112,8 @@ REFUSED = {
     '{name="a",address=0,type="uint16"},{name="a",address=1,type="uint16"}': "twice",
     '{name="a",address=65535,type="float32"}': "65535",
     '{name="a",address=0,type="float32",enumeration={x=1}}': "enumeration",
+    '{name="a",address=0,type="int16",minimum=2.0,maximum=1.0}': "minimum 2 is above maximum 1",
+    '{name="a",address=0,type="int16",unit="degF"}': "a: unit degF, degC is needed",
     '{name="a",adress=0,type="uint16"}': "address",
 }
 

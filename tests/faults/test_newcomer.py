@@ -37,7 +37,7 @@ SLIPS: list[tuple[tuple[str, ...], str]] = [  # words of a command, and what is 
     (("run", "production", "--units", ","), "serial '' is"),
     (("run", "--units", "{}/lot.csv"), "give the path of a slot map file in CSV or TOML"),
     (("run", "production", "--station", "none.toml"), "none.toml cannot be read"),
-    (("show", "nosuch"), "there is no run yet"),
+    (("show", "nosuch"), "holds no archive, one with runs is needed; name it with --archive or TUMBLELINE_ARCHIVE, or make one"),
     (("show", NO_FILE), ""),
     (("plan", NO_FILE), ""),
     (("plan", "optimize", "nosuch.toml"), "'nosuch.toml'"),
@@ -46,9 +46,10 @@ SLIPS: list[tuple[tuple[str, ...], str]] = [  # words of a command, and what is 
     (("import", "{}/nosuch.csv"), "nosuch.csv: cannot be read (No such file or directory)"),
     (("import", "{}/a.csv"), "no column of a.csv is mapped, x, y and z are needed at least (its columns: t, ax,"),
     (("import", "{}/a.csv", "--map", "x=ax,y=ay,z=az"), "one of g, mg, m/s^2, V, mV, LSB is needed; add --unit-of output=…"),
-    (("export", "nosuch"), "there is no run yet"),
+    (("export", "nosuch"), "holds no archive, one with runs is needed"),
     (("rerun", "all", "--check", "--effects", "bias"), "--check with another model or limits has no stored result"),
     (("export", "--format", "hex"), "no format is called 'hex'"),
+    (("export", "--format", "c", "--json"), "--json prints coefficients, --format c is another form"),
 ]  # fmt: skip
 
 

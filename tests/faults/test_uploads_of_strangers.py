@@ -126,6 +126,9 @@ def test_a_look_is_kept_until_the_file_changes(settings: WorkbenchSettings, monk
     Path(page.file).write_bytes(text_of(40_000))
     assert uploads.reading(settings, page).rows > first.rows
     assert len(read) == 2
+    rows = "".join(f"{1.01 * x + 0.02},{0.001 * k},0.03,{x},0,0\n" for k in range(9) for x in (1, -1))
+    Path(page.file).write_text(f"out_x [g],out_y [g],out_z [g],force_x,force_y,force_z\n{rows}", encoding="utf-8")
+    assert "not read by this page" in uploads.reading(settings, page).open[-1]
 
 
 def test_a_look_that_reaches_a_limit_says_how_to_import_the_file(settings: WorkbenchSettings, monkeypatch) -> None:

@@ -19,7 +19,6 @@ from schemas.units import AXES
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Upload", 30, "/upload"
-MEANINGS = ("time", "x", "y", "z", "temperature", "unit", "dwell")
 
 
 @router.get("/upload")
@@ -39,7 +38,7 @@ def upload(request: Request) -> Response:
     there = sorted(files, key=lambda file: -file.stat().st_mtime)[:12]
     return page(
         request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(file) for file in there],
-        meanings=MEANINGS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
+        meanings=uploads.FIELDS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
         level=partial(_level, 0.0 if reading is None else _largest(reading.dwells)),
         outputs=list(OUTPUT_UNITS), times=[*TIME_UNITS, "samples"], temperatures=TEMPERATURE_UNITS,
     )  # fmt: skip

@@ -37,6 +37,7 @@ LARGEST = 400_000_000
 NAME = re.compile(r"[^A-Za-z0-9._ -]+")
 PACKED = (".csv", ".tsv", ".txt", ".parquet")
 ENDINGS = (*PACKED, ".dat", ".mat", ".npy", ".h5", ".hdf5", ".xlsx", ".ods", *(f"{ending}.gz" for ending in PACKED))
+FIELDS = ("time", "x", "y", "z", "temperature", "unit", "dwell")  # meanings that the page asks for
 MOST_ROWS = 8
 MOST_LOOKED = 200_000
 """Rows in which columns are recognised: an hour of 50 Hz."""
@@ -185,7 +186,9 @@ def _recognised(plain: UploadReading, content: Content, source: SourceFile) -> U
     }
     proposed |= {"rows": str(keys["rows"])} if "rows" in keys else {}
     proposed |= {"rate": f"{keys['rate_hz']:g}"} if isinstance(keys.get("rate_hz"), float) else {}
-    return replace(plain, offered=offered, proposed=proposed, open=seen.open)
+    left = ", ".join(name for meaning, name in offered.items() if meaning not in FIELDS)
+    unread = f"{left}: not read by this page; the import that 'tumbleline inspect' prints reads them"
+    return replace(plain, offered=offered, proposed=proposed, open=(*seen.open, *([unread] if left else [])))
 
 
 def _read_as(plain: UploadReading, table: pd.DataFrame, page: UploadPage) -> UploadReading:

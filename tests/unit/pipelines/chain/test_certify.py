@@ -12,7 +12,7 @@ from ledger_events import day
 from typed_commands import printed_commands
 from typer.testing import CliRunner, Result
 
-from pipelines.archive import Archive, Run, files
+from pipelines.archive import Archive, Run, files, hash_chain
 from pipelines.archive.signatures import VARIABLE, make_key
 from pipelines.certificates import Ledger
 from pipelines.certificates.coefficient_remarks import library_remarks
@@ -249,6 +249,9 @@ def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
     meanwhile(monkeypatch, lambda: certify(ledger, run))  # the same certificate is written once
     assert {event.certificate for event in certify(ledger, run).there} == {"A1/1", "A2/2", "A3/1"}
     assert len(ledger.events("A1")) == 1
+    # a writer that is killed before the chain has its certificates: the same command adds them
+    hash_chain.path_of_entry(ledger.root, hash_chain.last_number(ledger.root)).unlink()
+    assert len(ledger.unanchored(certify(ledger, run).there)) == 0
 
 
 @pytest.fixture
