@@ -210,6 +210,8 @@ class RecipeFile(_Measurement):
             raise ValueError("key 'poses' is missing; add it")
         if bool(self.model) == bool(self.effects):
             raise ValueError("effects, model: one of the two is needed; list the effects, or name a model file")
+        if self.verification_repeats > 1 and not self.verification:
+            raise ValueError("verification_repeats: there are no poses to repeat; add verification, or leave it out")
         return self
 
 

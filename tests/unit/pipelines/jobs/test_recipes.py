@@ -49,6 +49,7 @@ REFUSED: tuple[tuple[str, str, tuple[str, ...]], ...] = (
      ("velocity_random_walk_ug_rtHz, bias_instability_ug need a static record",)),
     ("verification = [[35.0, 15.0], [105.0, -100.0]]", "verification = []",
      ("verification_ratio, bias_error_ug need verification poses",)),
+    ("verification = [[35.0, 15.0], [105.0, -100.0]]", "verification_repeats = 3", ("verification_repeats: there are no",)),
     ('["A1", "A2", "A3"]', '["A1", "A1"]', ("A1 is there twice",)),
     ("[0.0, 50.0]", "[0.0, 25.0, 25.0]", ("twice in a row",)),
     ('name = "small"\n', 'name = "small\n', ("line 2",)),
