@@ -48,13 +48,15 @@ class ArchiveView:
         Raises
         ------
         WrongUse
-            No calibration of the unit is valid on that day, or a day is given without a unit.
+            No run has the unit, no calibration of it is valid on that day, or a day is given without a unit.
         """
-        from schemas.errors import WrongUse
+        from schemas.errors import WrongUse, did_you_mean
 
         if not at:
             rows = self.query(_OF_ALL_RUNS)
             rows = rows.assign(U=K * rows["standard_error"].astype(float))
+            if unit and not (rows["unit"] == unit).any():
+                raise WrongUse(f"coefficients: no run has any of unit {unit}; {did_you_mean(unit, rows['unit'])}")
             return rows[rows["unit"] == unit].reset_index(drop=True) if unit else rows
         if not unit:
             raise WrongUse("coefficients: a day is given and no unit, both are needed; give unit='…'")
@@ -87,20 +89,9 @@ class ArchiveView:
 
         document = discovered(self.store, Look(device=device)).document
         rows = [*document["discoveries"], *document["unexplained"]]
-        columns = (
-            "id",
-            "since",
-            "recommended",
-            "driver",
-            "size_ug",
-            "size_floors",
-            "log_e",
-            "scope",
-            "confirmed",
-            "effects",
-            "drivers",
-        )
-        return pd.DataFrame([{name: row.get(name) for name in columns} for row in rows], columns=list(columns))
+        columns = ["id", "since", "recommended", "driver", "size_ug", "size_floors", "log_e", "scope", "confirmed",
+                   "effects", "drivers"]  # fmt: skip
+        return pd.DataFrame([{name: row.get(name) for name in columns} for row in rows], columns=columns)
 
     def plot(self, unit: str, effect: str = "bias") -> Picture:
         """Change of a unit's coefficients of an effect since they were measured first, with U (k = 2) as bars, by day."""
@@ -110,9 +101,7 @@ class ArchiveView:
         rows = self.coefficients(unit)
         rows = rows[rows["effect"] == effect]
         if not len(rows):
-            raise WrongUse(
-                f"plot: no run of this archive has coefficients of {effect} of unit {unit}; see .coefficients()"
-            )
+            raise WrongUse(f"plot: no run has coefficients of {effect} of unit {unit}; see .coefficients()")
         days = (
             pd.to_datetime(rows["measured"], utc=True, format="ISO8601").dt.tz_localize(None).to_numpy("datetime64[s]")
         )

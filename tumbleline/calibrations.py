@@ -76,13 +76,15 @@ class Calibration:
         pandas.DataFrame
             ``time_s``, ``force_x_g`` …, ``u_x_ug`` … (standard uncertainties) and covariances.
         """
+        from inertial.errors import MissingInput
+        from inertial.quantities import column_of
         from pipelines.export.corrected import corrected, fit_of_unit, table_of
         from pipelines.export.recording import at_calibrated_supply, recording_of
         from pipelines.jobs.model_files import use_formulas_of
-        from schemas.errors import WrongUse
+        from schemas.errors import DataRejected, WrongUse
 
         use_formulas_of(self.run)
-        fit = fit_of_unit(self.run, unit, failed=True, revoked=False)
+        fit = fit_of_unit(self.run, str(unit), failed=True, revoked=False)
         axes = fit.exported.axes
         if isinstance(samples, pd.DataFrame):
             table = samples
@@ -107,7 +109,10 @@ class Calibration:
             raise WrongUse(f"correct: rate_hz={rate_hz:g}, more than 0 is needed; leave it out, or correct it")
         rate = 1.0 if rate_hz is None and "time_s" not in table else rate_hz
         recording = at_calibrated_supply(recording_of(table, "samples", rate_hz=rate, axes=axes, least=1), self.run)
-        return table_of(recording, corrected(recording, fit, None))
+        try:
+            return table_of(recording, corrected(recording, fit, None))
+        except MissingInput as lack:
+            raise DataRejected(f"correct: no {column_of(lack.quantity)}, {lack.effect} needs it; add it") from None
 
     def export(self, form: str = "json", output: str | Path | None = None, **settings: Any) -> str | bytes:
         """The coefficients for firmware, autopilots and spreadsheets.

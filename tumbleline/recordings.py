@@ -145,19 +145,25 @@ def read(
         The recording cannot be used; the message says why.
     """
     from pipelines.importers.exchange import checked, checked_history, is_exchange, read_history
-    from schemas.errors import WrongUse
+    from schemas.errors import DataRejected, WrongUse
 
     several: Any = source  # anything may be given
     if units is not None and not isinstance(cast("Any", units), Mapping):
         raise WrongUse(
             f"read: units: found {units!r}, units by quantity are needed; write units={{'output': {units!r}}}"
         )
+    if columns is not None and not isinstance(cast("Any", columns), Mapping):
+        raise WrongUse(f"read: columns: found {columns!r}, columns by meaning are needed: columns={{'x': 'ax', …}}")
     unused = [
         *(["serial"] if serial else []),
         *stated,
         *(f"units['{what}']" for what in units or {} if what != "output"),
     ]
     if isinstance(source, pd.DataFrame):
+        if not len(source):
+            raise DataRejected("read: a DataFrame without rows, at least one is needed; check how it was made")
+        named = [name for name in source.index.names if name is not None and name not in source]  # a time, most often
+        source = source.reset_index(named) if named else source
         if is_exchange(source.columns) and not columns:
             _refuse(unused, "a table of dwells in the exchange format")
             past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
@@ -222,8 +228,8 @@ def _archive_address(archive: str | Path | None) -> str:
 
 def _as_file(table: pd.DataFrame) -> Path:
     """The table as a file that an import reads, named by its content."""
-    named = [name for name in table.index.names if name is not None and name not in table]  # a time, most often
-    text = (table.reset_index(named) if named else table).to_csv(index=False).encode()
+    text = table.apply(lambda values: values.dt.total_seconds() if values.dtype.kind == "m" else values)
+    text = text.to_csv(index=False).encode()
     path = session_folder() / hashlib.sha256(text).hexdigest()[:10] / "DataFrame.csv"
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(text)
@@ -261,7 +267,7 @@ def _imported(
     build(keys, name)
     done = import_document([*paths], keys, name, "", _archive_address(archive), None, nullcontext)
     run = Archive(_archive_address(archive)).run(done["run"])
-    return Recording(run, _told(seen, proposal, done["remarks"]), Proposal(keys).command(paths))
+    return Recording(run, _told(seen, proposal, done["remarks"], stated), Proposal(keys).command(paths))
 
 
 def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str]:
@@ -273,7 +279,9 @@ def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str
     return left or ([] if decided or not seen.open or keys["columns"] else list(seen.open))
 
 
-def _told(seen: Recognition, proposal: Proposal | None, remarks: Sequence[str]) -> tuple[str, ...]:
+def _told(seen: Recognition, proposal: Proposal | None, remarks: Sequence[str], stated: Any) -> tuple[str, ...]:
+    cures = ["(--rate " if key == "rate_hz" else f"(--set {key}=" for key in stated]  # end an assumption of a key
+    assumed = () if proposal is None else (line for line in proposal.assumed if not any(cure in line for cure in cures))
     guessed = seen.guessed
     axes = ", ".join(filter(None, (guessed.column(axis) for axis in "xyz")))
     told = (
@@ -281,7 +289,7 @@ def _told(seen: Recognition, proposal: Proposal | None, remarks: Sequence[str]) 
         if axes
         else []
     )
-    return (*told, *(() if proposal is None else (*proposal.assumed, *proposal.remarks)), *remarks)
+    return (*told, *assumed, *(() if proposal is None else proposal.remarks), *remarks)
 
 
 @dataclass(frozen=True)

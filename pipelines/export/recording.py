@@ -18,7 +18,7 @@ from pipelines.archive import Run
 from pipelines.importers import files
 from pipelines.importers.clocks import unit_stated
 from pipelines.importers.stated_units import column_name, output_unit
-from pipelines.importers.values import as_numbers, finite_column
+from pipelines.importers.values import as_numbers, finite_column, is_moment, seconds
 from pipelines.stages.uncertainty.budget_terms import archived_terms
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
@@ -94,7 +94,9 @@ def recording_of(
     least: int = 2,
 ) -> CorrectableRecording:
     """The recording of a table of ``least`` samples or more, as :func:`read_recording`; ``where``: its name, for messages."""
-    there = list(table.columns)
+    there, clock = list(table.columns), time or TIME
+    if clock in there and is_moment(table[clock]):
+        table = table.assign(**{clock: seconds(table[clock], where)})
     letters = [AXES[axis] for axis in axes]
     usual = ([names[axis] for axis in axes] for names in USUAL)
     chosen = list(columns) or next((names for names in usual if set(names) <= set(there)), [])
@@ -108,7 +110,7 @@ def recording_of(
     n = len(output)
     if rate_hz is not None and time:
         raise WrongUse(f"{where}: --map time=… and --rate are both given, one is needed; leave one out")
-    moments = np.arange(n) / rate_hz if rate_hz is not None else finite_column(table, time or TIME, where)
+    moments = np.arange(n) / rate_hz if rate_hz is not None else finite_column(table, clock, where)
     if n < least or not np.all(np.diff(moments) > 0.0):
         raise DataRejected(
             f"{where}: {n} samples whose time does not always increase, {least} or more in order are needed; sort the "
@@ -117,7 +119,7 @@ def recording_of(
     known = np.full((n, 3), np.nan)
     if set(FORCE_COLUMNS) <= set(there):
         known = np.stack([as_numbers(table[name], where) for name in FORCE_COLUMNS], axis=1)
-    state = replace(_state(table, moments, {*chosen, time or TIME}, where), axes=tuple(axes))
+    state = replace(_state(table, moments, {*chosen, clock}, where), axes=tuple(axes))
     return CorrectableRecording(moments, output, state, known, where)
 
 
@@ -146,12 +148,12 @@ def _state(table: pd.DataFrame, time: Array, used: set[str], where: str) -> Stat
     known: dict[str, Any] = {}
     covariates: dict[str, Array] = {}
     for column in table.columns:
-        if column in used or column in FORCE_COLUMNS or not pd.api.types.is_numeric_dtype(table[column]):
+        if column in used or column in FORCE_COLUMNS:
             continue
         row = BY_COLUMN.get(column)
         if row is not None and row.attribute and not row.once:
             known[row.attribute] = row.factor * finite_column(table, column, where)
-        elif row is None or not row.attribute:
+        elif (row is None or not row.attribute) and pd.api.types.is_numeric_dtype(table[column]):
             covariates[column] = as_numbers(table[column], where, flags=True)
     known["time"] = time
     return State(force=np.zeros((len(time), 3)), **known, covariates=covariates)

@@ -89,6 +89,6 @@ def required_noise(noise: UnitNoise | None, unit: str, run: str, form: str, with
     if noise is None or not all(np.all(np.isfinite(noise.value[s])) for s in ("N", "K")):
         raise WrongUse(
             f"run {run}: it has no noise terms of unit {unit}, {form} needs them; measure with static_record_s above 0 in the "
-            f"recipe{without}"
+            f"recipe (an import has none; 'tumbleline noise allan RECORD' computes them){without}"
         )
     return noise

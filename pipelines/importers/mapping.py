@@ -250,7 +250,7 @@ def build(content: dict[str, Any], where: str) -> Mapping:
             words = f"this key is not known; {did_you_mean(str(first['loc'][-1]), known)}"
         elif first["type"] == "missing":
             words = "it is needed; add it"
-        raise RecipeInvalid(f"{where}: {shown(key)}{': ' if key else ''}{words}", key=key, close=close) from None
+        raise RecipeInvalid(": ".join(filter(None, (where, shown(key), words))), key=key, close=close) from None
 
 
 def of_exchange(table: pd.DataFrame, keys: dict[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:

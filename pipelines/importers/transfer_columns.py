@@ -45,6 +45,7 @@ NEEDED = ("frequency", "magnitude", "phase")
 UNCERTAINTIES = ("magnitude_uncertainty", "phase_uncertainty")
 COVERAGE = re.compile(r"[(\[,;]?\s*\bk\s*=\s*([1-9]\d*(?:\.\d+)?)\s*[)\]]?")
 """Coverage factor in the name of a column of expanded uncertainties, as in ``U [%] (k = 2)``."""
+PER = re.compile(r"/\s*\(?\s*(g|m.*?)[)\]\s]*$")
 STATED = {"repeatability_percent": "magnitude_uncertainty", "repeatability_deg": "phase_uncertainty"}
 """Keys of a sweep that state the uncertainty of every point."""
 OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan, "pressure_hPa": np.nan}
@@ -198,14 +199,18 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
     known = UNITS[meaning]
     unit = _plain(given or stated)
     if meaning == "magnitude":  # output in any unit per g, unless it is said to be a level, or per m/s²
-        if _per_m_s2(given or stated or column):
+        if _per(given or stated or column) == "m/s^2":
             return PER_M_S2
-        if given and _per_m_s2(stated or column):
+        if given and _per(stated or column) == "m/s^2":
             raise WrongUse(
                 f"{where}: column '{shown(column)}' states a unit per m/s², --unit-of {meaning}={shown(given)} has "
                 "none; leave it out, or write the whole unit"
             )
-        return IN_DECIBEL if unit.lower().startswith(IN_DECIBEL.lower()) else LINEAR
+        if unit.lower().startswith(IN_DECIBEL.lower()):
+            return IN_DECIBEL
+        if given and not (output_unit(given) or _per(given) == "g" or given == "1"):
+            raise WrongUse(f"import: --unit-of magnitude={shown(given)}: unknown; write V/g, mV/(m/s^2) or dB")
+        return LINEAR
     if unit not in known:
         what = f"unit '{shown(given or stated)}'" if given or stated else "no unit"
         raise DataRejected(
@@ -214,10 +219,10 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
     return unit
 
 
-def _per_m_s2(unit: str) -> bool:
-    """Whether a unit, or the name of a column, ends with one per m/s²."""
-    per = re.search(r"/\s*\(?\s*(m.*?)[)\]\s]*$", unit)
-    return per is not None and output_unit(per[1]) == "m/s^2"
+def _per(unit: str) -> str:
+    """The unit of acceleration per which a unit, or the name of a column, is at its end; empty for none."""
+    per = PER.search(unit)
+    return output_unit(per[1]) if per else ""
 
 
 def output_of(content: Content, layout: PointsLayout) -> str:
@@ -225,7 +230,7 @@ def output_of(content: Content, layout: PointsLayout) -> str:
     column = _columns(content.table, layout).get("magnitude", "")
     bracketed = re.search(r"[\[(](.+)[\])]$", column.strip())
     stated = layout.units.get("magnitude", "") or content.units.get(column, "") or (bracketed[1] if bracketed else "")
-    return output_unit(stated.partition("/")[0])
+    return output_unit(PER.sub("", stated))
 
 
 def _plain(unit: str) -> str:

@@ -64,6 +64,8 @@ def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> Array:
     ----------
     flags : whether true and false count as 1 and 0.
     """
+    if values.ndim > 1:
+        raise DataRejected(f"{where}: column '{shown(str(values.columns[0]))}' is there twice; rename one of the two")
     name = shown(str(values.name))
     if is_moment(values):
         raise DataRejected(
@@ -100,7 +102,7 @@ def finite_column(
     """The numbers of a column of samples or points; a missing column and a value that is no finite number are refused."""
     if name not in table.columns:
         raise DataRejected(f"{where}: column '{shown(name)}' is not there; {did_you_mean(name, list(table.columns))}")
-    numbers = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
+    numbers = as_numbers(table[name], where)
     bad = np.flatnonzero(~(np.abs(numbers) < LARGEST))
     if bad.size:
         found = shown(str(table[name].iloc[bad[0]]))

@@ -51,6 +51,11 @@ def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataF
     assert any("ax, ay, az" in line for line in run.told)
     assert len(run.dwells) == 24
     assert tl.read(turned[["t", "ax", "ay", "az"]].set_index("t"), units={"output": "g"}).dwells.equals(run.dwells)
+    spans = turned[["ax", "ay", "az"]].set_index(pd.to_timedelta(turned["t"], unit="s"))
+    columns = ["time_s", "out_x", "sd_z"]
+    assert np.allclose(tl.read(spans, units={"output": "g"}).dwells[columns], run.dwells[columns], rtol=1e-9)
+    untimed = tl.read(turned[["ax", "ay", "az"]], units={"output": "g"}, rate_hz=100.0)
+    assert not any("assumed" in line for line in untimed.told)  # what was stated is not assumed
     fit = tl.fit(run)
     diagnosis = tl.diagnose(run, fit)
     assert diagnosis.adequate is False
@@ -120,6 +125,8 @@ def test_objects_draw_themselves_and_export_and_an_archive_is_tables(turned: pd.
     view = tl.archive(kept)
     assert fit.run.id in view.runs["id"].tolist()
     rows = view.coefficients("SN7")
+    with pytest.raises(tl.WrongUse, match="no run has any of unit SN8; did you mean SN7"):
+        view.coefficients("SN8")
     assert set(rows["effect"]) == {"bias", "scale", "misalignment"}
     assert view.query("SELECT count(*) AS n FROM coefficients")["n"].iloc[0] == len(rows)
     assert view.calibration(fit.run.id).rms_ug == fit.rms_ug
@@ -142,6 +149,14 @@ def test_what_is_open_is_refused_with_what_to_state(lot: tl.Example, tmp_path: P
             tl.read(wrong)
     with pytest.raises(tl.WrongUse, match=r"write units=\{'output': 'g'\}"):
         tl.read(table, units="g")
+    with pytest.raises(tl.WrongUse, match=r"are needed: columns=\{'x'"):
+        tl.read(table, columns=["p", "q"])
+    dwells = lot.run.dwells
+    with pytest.raises(tl.DataRejected, match="column 'out_x' is there twice"):
+        tl.read(pd.concat([dwells, dwells[["out_x"]]], axis=1))
+    with pytest.raises(tl.DataRejected, match="without rows"):
+        tl.read(dwells.iloc[:0])
+    assert tl.read(dwells.set_index(["unit", "dwell"])).dwells[dwells.columns].equals(tl.read(dwells).dwells)
     with pytest.raises(tl.WrongUse, match="history: not used for a recording that is imported"):
         tl.read(table, history=lot.run.history)
     with pytest.raises(tl.WrongUse, match="serial, rate_hz: not used for a table of dwells"):

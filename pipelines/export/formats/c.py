@@ -23,6 +23,7 @@ SUFFIX = ".h"
 FEWER_AXES = True
 
 _PACKED = {"double": "d", "float": "f", "q24": "i"}
+_TAKEN = {"calibration", "correct", "crc32", "crc32_number", "from_counts", "intact", "product"}  # fmt: skip
 _COUNTS_BITS = 48  # of the factor from counts to fixed point
 
 
@@ -124,7 +125,7 @@ def checksum(unit: str, packing: str, values: Sequence[Any]) -> int:
 
 
 def _symbol(unit: UnitCalibration) -> str:
-    return re.sub(r"\W", "_", unit.unit, flags=re.ASCII)
+    return re.sub(r"\W", "_", unit.unit, flags=re.ASCII) + "_" * (unit.unit in _TAKEN)
 
 
 def _braces(values: Any, literal: Any) -> str:

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
-from pipelines.export.recording import read_recording
-from schemas.errors import WrongUse
+from pipelines.export.recording import read_recording, recording_of
+from schemas.errors import DataRejected, WrongUse
 
 
 def test_columns_have_names_or_numbers_and_another_unit_than_that_of_the_calibration_is_refused(tmp_path: Path) -> None:
@@ -16,3 +17,14 @@ def test_columns_have_names_or_numbers_and_another_unit_than_that_of_the_calibra
         read_recording(path, ["ax [mV]", "4", "5"], time="1", unit="V")
     with pytest.raises(WrongUse, match=r"column 't \[ms\]' states ms, s is needed"):
         read_recording(path, ["3", "4", "5"], time="2", unit="mV")
+
+
+def test_points_in_time_are_seconds_and_a_condition_with_a_gap_is_refused_by_its_row() -> None:
+    moments = pd.date_range("2026-03-29 01:59:59", periods=3, freq="s", tz="Europe/Berlin")
+    table = pd.DataFrame({"time_s": moments, "x": 1.0, "y": 2.0, "z": 3.0, "unit_C": [25.0, 26.0, 27.0]})
+    assert recording_of(table, "t").time.tolist() == [0.0, 1.0, 2.0]
+    assert recording_of(table.astype({"unit_C": object}), "t").state.temperature.tolist() == [25.0, 26.0, 27.0]
+    with pytest.raises(DataRejected, match="t: row 2, column 'unit_C': found -, a finite number"):
+        recording_of(table.assign(unit_C=["25", "-", "27"]), "t")
+    with pytest.raises(DataRejected, match="t: column 'x' is there twice"):
+        recording_of(pd.concat([table, table[["x"]]], axis=1), "t")

@@ -11,7 +11,7 @@ from scipy import signal
 
 from pipelines.importers.content import Content
 from pipelines.importers.transfer import import_transfer
-from pipelines.importers.transfer_columns import PointsLayout, transfer_points
+from pipelines.importers.transfer_columns import PointsLayout, output_of, transfer_points
 from schemas.errors import DataRejected, WrongUse
 
 HEAD = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
@@ -70,6 +70,20 @@ def test_a_sensitivity_per_m_s2_is_one_per_g_after_the_import(head: str, tmp_pat
     assert any(" mV per g, " in line for line in done["text"])
     with pytest.raises(WrongUse, match=r"--unit-of magnitude=mV has none; leave it out"):
         import_transfer(path, "S1", archive=str(tmp_path / "archive"), layout=PointsLayout(units={"magnitude": "mV"}))
+
+
+@each([("banana", None), ("V/mg", None), ("mV/V/g", ""), ("mV/V/(m/s^2)", ""), ("LSB", "LSB"), ("V/g", "V")])
+def test_a_unit_of_no_sensitivity_is_refused_and_one_per_supply_is_no_voltage(
+    row: tuple[str, str | None], tmp_path: Path
+) -> None:
+    content = Content(pd.read_csv(written(tmp_path / "b.csv")))
+    layout = PointsLayout(units={"magnitude": row[0]})
+    if row[1] is None:
+        with pytest.raises(WrongUse, match=f"magnitude={row[0]}: unknown; write V/g"):
+            transfer_points(content, "b.csv", layout)
+    else:
+        transfer_points(content, "b.csv", layout)
+        assert output_of(content, layout) == row[1]
 
 
 @pytest.mark.parametrize("ending", [" (k=2)", ", k = 2.00"])
