@@ -62,6 +62,7 @@ def test_a_copy_restored_is_the_archive_byte_for_byte(made: Path, tmp_path: Path
     assert verify(Archive(back), keys={}).head == verify(Archive(root), keys={}).head
 
 
+@pytest.mark.slow
 def test_a_further_copy_adds_what_is_new_and_a_continued_run_is_complete_in_it(line, tmp_path: Path) -> None:
     archive, copy = line
     first = copy_archive(archive, copy)

@@ -38,7 +38,8 @@ def _own_state(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("name", mostly_slow(FAMILIES, "watlow_f4t"))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FAMILIES)
 def test_the_simulated_device_of_every_family_passes(name, tmp_path):
     """A whole bring-up with every consent, recorded, finds no difference and leaves the device as it was."""
     profile = load_profile(name)

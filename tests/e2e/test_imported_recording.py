@@ -141,6 +141,7 @@ def test_an_import_a_fit_and_a_diagnosis_of_one_file_say_the_same() -> None:
     assert first["error"]["fit_rms_ug"] == pytest.approx(first["error"]["rms_ug"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_bad_dwell_is_named_and_the_fit_without_it_is_a_run_of_its_own() -> None:
     what = Recording(30, "white 280, B 30", bad=1, bad_ug=5000.0)
     spoilt = make(what, 9).spoilt[0]

@@ -120,6 +120,7 @@ def test_a_terminal_is_asked_and_may_stop_and_a_scanner_types_the_serials(tmp_pa
         scanned(2)
 
 
+@pytest.mark.slow
 def test_a_lot_larger_than_the_fixture_is_measured_filling_by_filling(tmp_path: Path) -> None:
     text = (ROOT / "stations" / "simulated.toml").read_text(encoding="utf-8")
     assert text.count("[devices.slots]\n") == 1

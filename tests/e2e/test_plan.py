@@ -109,6 +109,7 @@ def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces: Path) -
     assert rows["scale", "z"]["unit"] == "µg/g"
 
 
+@pytest.mark.slow
 def test_the_error_of_a_verification_pose_is_planned_with_its_noise_and_limits_at_risk_are_told(faces: Path) -> None:
     text = f"verification = [[35.0, 55.0]]\n{RECIPE}"
     faces.write_text(text, encoding="utf-8")

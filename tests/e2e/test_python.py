@@ -223,6 +223,7 @@ print(len(tl.archive("archive").runs))
 """
 
 
+@pytest.mark.slow
 def test_the_desk_side_needs_no_module_that_windows_lacks(lot: tl.Example, tmp_path: Path) -> None:
     lot.run.dwells.query("unit == 'DEMO-1'").to_csv(tmp_path / "dwells.csv", index=False)
     done = subprocess.run(

@@ -33,6 +33,7 @@ def ending(folder: Path) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_a_run_that_ends_early_says_so_everywhere(tmp_path: Path) -> None:
     root = tmp_path / "archive"

@@ -18,6 +18,7 @@ def with_prior(folder: Path, prior: str = 'full = "full.toml"') -> str:
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_a_lot_of_the_family_is_fitted_with_its_prior(tmp_path: Path) -> None:
     """The family's spread is that of the preset; a station's own error of the bias is far below it, so its share is small."""

@@ -16,7 +16,6 @@ import pandas as pd
 import pytest
 from each import each
 from in_process import typed_document
-from long_suites import mostly_slow
 from pydantic import ValidationError
 from root_process import ROOT
 from served_station import served
@@ -114,7 +113,8 @@ def test_a_killed_run_with_a_silent_unit_goes_on_bit_for_bit() -> None:
     same(captured(RECIPE, config=config), killed_and_resumed(RECIPE, 2, config))
 
 
-@pytest.mark.parametrize("name", mostly_slow(OTHERS, OTHERS[1]))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OTHERS)
 def test_a_killed_run_on_other_devices_goes_on_bit_for_bit_and_every_value_can_be_looked_at(name: str) -> None:
     config, recipe = load_station(STATIONS / f"{name}.toml"), short_recipe(poses=2, temperatures=(25.0, 30.0))
     complete = captured(recipe, config=config)

@@ -79,7 +79,7 @@ except SystemExit as left:
 """
 
 
-@pytest.mark.parametrize("command", mostly_slow(["noise allan", "noise psd", "diagnose"], "noise psd", "diagnose"))
+@pytest.mark.parametrize("command", mostly_slow(["noise allan", "noise psd", "diagnose"], "noise psd"))
 def test_commands_load_no_library_that_they_do_not_need(command: str, tmp_path: Path) -> None:
     path, options, idle = (
         tmp_path / "given.csv",

@@ -63,6 +63,7 @@ def test_a_hidden_effect_of_a_shock_is_named_and_samples_left_out_are_predicted_
     assert diagnosis.left_out[0] > 1.04
 
 
+@pytest.mark.slow
 def test_shocks_in_one_direction_do_not_tell_an_ac_coupled_reference_from_a_zero_shift(rng) -> None:
     one = diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng, signs=(1.0,)))
     both = diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng))

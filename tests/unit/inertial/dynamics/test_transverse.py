@@ -64,6 +64,7 @@ def test_a_departure_within_the_noise_is_held_by_its_interval(rng: np.random.Gen
     assert largest_departure(supply, bent, own) == (5e-3, pytest.approx(np.sqrt(2.0) * 1e-4), 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("supplies", [(12.0, 10.0, 11.0, 13.0, 14.0), (12.0, 11.0, 13.0)])
 def test_a_curve_symmetric_about_the_first_supply_has_its_departure_and_a_slope(supplies, rng):
     supply, own = np.array(supplies), np.full(len(supplies), 1.0)

@@ -3,6 +3,7 @@
 import made_noise as generate
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from scipy.stats import chi2
 
 from inertial.noise.allan import overlapping
@@ -148,7 +149,7 @@ def test_the_innovations_of_flicker_noise_are_white_and_as_large_as_stated(rng: 
     assert np.mean([one.consistency.stated == "consistent" for one in estimates]) >= 0.6
 
 
-@pytest.mark.parametrize(("white", "walk"), [(0.05, 0.0), pytest.param(1.0, 0.0, marks=pytest.mark.slow), (0.05, 0.05)])
+@pytest.mark.parametrize(("white", "walk"), mostly_slow([(0.05, 0.0), (1.0, 0.0), (0.05, 0.05)], (0.05, 0.0)))
 def test_a_record_and_its_allan_fit_state_the_error_of_the_bias(white: float, walk: float) -> None:
     """Half an hour at rest gives N, B and K; then updates, and none for up to ten minutes; B = 1."""
     rng, record, runs = np.random.default_rng([31, round(100 * white), round(100 * walk)]), 1800, 8

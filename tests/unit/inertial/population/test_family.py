@@ -50,6 +50,7 @@ def test_it_is_the_analysis_of_variance_where_all_errors_are_alike() -> None:
     np.testing.assert_allclose(np.diagonal(family.lot, axis1=-2, axis2=-1)[:, 0], (lots - inside)[:, 0] / 8, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_the_unit_of_the_output_does_not_matter_and_a_small_family_predicts_with_a_wider_covariance() -> None:
     values, error, lot = calibrations(np.random.default_rng(4), 20, 4)
     one, other = family_of(values, error, lot), family_of(1e6 * values, 1e12 * error, lot)

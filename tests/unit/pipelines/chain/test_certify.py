@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from capture_double import BRIEF, small_run
 from each import each
-from ledger_events import day
+from ledger_events import day, day_before
 from typed_commands import printed_commands
 from typer.testing import CliRunner, Result
 
@@ -75,13 +75,16 @@ def test_a_certificate_begins_at_the_measurement_or_later_and_lasts_no_longer_th
     )
     assert allowed_months(run) == VALIDITY_MONTHS
     for words in (
-        ("--since", day(-1)), ("--until", "13m"), ("--until", "2099-01-01"), ("--since", day(400)), ("--until", "1200m"),
+        ("--since", day_before(end_of(run))), ("--since", day(400)),
+        ("--until", "13m"), ("--until", "2099-01-01"), ("--until", "1200m"),
     ):  # fmt: skip
         assert typed("certificate", "issue", run.id, *words).exit_code != 0, words
     ledger = Ledger(run.archive)
     assert ledger.events("A1") == []
     assert typed("certificate", "issue", run.id).exit_code == 0
-    assert ledger.events("A1")[0].until == months_after(end_of(run), VALIDITY_MONTHS)
+    event = ledger.events("A1")[0]
+    assert event.start >= end_of(run)
+    assert event.until == months_after(event.start, VALIDITY_MONTHS)
     assert typed("certificate", "issue", run.id, "--since", day(1)).exit_code == 0
 
 
@@ -199,7 +202,8 @@ def test_the_limits_file_says_how_long_within_bounds_and_stays_out_of_the_name_o
     ledger = Ledger(run.archive)
     with pytest.raises(WrongUse, match=r"no more than until .* is allowed; limits 'half' allow 6 months"):
         certify(ledger, new, months=7)
-    assert certify(ledger, new).written[0].until == months_after(end_of(run), 6)
+    event = certify(ledger, new).written[0]
+    assert event.until == months_after(event.start, 6)
     for months in ("0", "121", '"6"', "true", "6.5"):
         with pytest.raises(RecipeInvalid, match="validity_months"):
             parse_limits(LIMITS.replace("= 6", f"= {months}"), "half.toml", UNITS)

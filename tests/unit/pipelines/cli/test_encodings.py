@@ -45,6 +45,7 @@ def test_a_document_in_another_encoding_is_json_all_the_same(monkeypatch: pytest
     assert json.loads(written.getvalue().decode("ascii")) == {"unit": "g/√Hz", "µ": 1.0}
 
 
+@pytest.mark.slow
 def test_a_folder_or_a_file_whose_name_is_no_text_is_refused_in_one_message(record: Path, tmp_path: Path) -> None:
     if os.name == "nt" or sys.getfilesystemencoding() != "utf-8":
         pytest.skip("names are text here")

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from long_suites import mostly_slow
 from numpy.typing import NDArray
 from procedure_records import procedure_records
 from scipy import optimize, signal
@@ -210,9 +209,8 @@ def largest_lag(change_K: float, over_s: float) -> float:
     return float(np.max(die - shell))
 
 
-@pytest.mark.parametrize(
-    "profile", mostly_slow(["mil_std_810_temperature_shock", "temperature_variation"], "mil_std_810_temperature_shock")
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["mil_std_810_temperature_shock", "temperature_variation"])
 def test_adhesive_yields_in_shocks_of_cold_and_not_in_slow_cycles(profile: str) -> None:
     shock = profile != "temperature_variation"
     hidden = Hidden(kind="yielding_adhesive", figures={"gain": 100e-6, "scale": 50e-6})

@@ -38,6 +38,7 @@ def test_white_density_comes_back_as_the_preset_says(name):
     assert x.std() == pytest.approx(density * 1e-6 * np.sqrt(RATE / 2.0), rel=0.01)
 
 
+@pytest.mark.slow
 def test_allan_deviation_of_flicker_is_flat_at_0_664_of_the_instability():
     x = UnitNoise(preset_with(bias_instability_ug=100.0), streams(16)).sample(60_000, 10.0).reshape(60_000, -1)
     for m in (50, 100, 200):
