@@ -98,6 +98,28 @@ def test_parts_of_a_lock_hold_each_library_once_with_its_hashes(
     assert all("--hash=" in entry for entry in entries)
 
 
+@each([(OTHER, 0, 2), (OTHER, 1, 2), (UNREACHED, 1, 1)])
+def test_parts_that_were_in_each_others_way_are_installed_by_one_pip(
+    row: tuple[str, int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said, status, calls = row
+    asked: list[list[list[str]]] = []
+
+    def pip(parts: list[list[str]], _folder: Path) -> tuple[int, str]:
+        asked.append(parts)
+        return (1, said) if len(parts) > 1 else (status, said)
+
+    monkeypatch.setattr(environment, "_pip", pip)
+    parts = [["-r", "0.lock"], ["-r", "1.lock"]]
+    if status:
+        with pytest.raises(NotSetUp, match=r"\(all that pip said: "):
+            environment._install(parts, tmp_path, LOCK, None)
+    else:
+        environment._install(parts, tmp_path, LOCK, None)
+    assert asked == [parts, [["--require-hashes", "-r", str(LOCK)]]][:calls]
+    assert (tmp_path / "install.log").read_text(encoding="utf-8") == said
+
+
 def _wheel(folder: Path, name: str) -> str:
     """The hash of a wheel of one module without content, which is written into a folder."""
     module = name.replace("-", "_")
