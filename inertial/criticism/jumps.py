@@ -48,15 +48,18 @@ class _AxisJumps:
     terms: tuple[Term, ...]
 
 
-def jumps_in_place_of(field: Candidates, model: Model, rival: Rival) -> Jumps | None:
-    """The jumps of single axes that explain about as much as an effect with coefficients for every axis; None if none do."""
+def jumps_in_place_of(field: Candidates, model: Model, *rivals: Rival) -> Jumps | None:
+    """The jumps of single axes that explain about as much as effects with coefficients for every axis; None if none do."""
     alternatives = [a for a in field.handling if a.of_one_axis]
-    if not alternatives or rival.term.shared or not rival.rank:
+    if not alternatives or not all(rival.rank and not rival.term.shared for rival in rivals):
         return None
-    space = model.at(model.with_term(rival.term).noise)
-    # the noise is estimated with the effect in the model; at this fixed noise deviances are sums of squares
-    drops = _drops(space, rival.term.candidate(model.problem))
-    score = _score(drops, rival, field.problem.per_unit)
+    terms = [rival.term for rival in rivals]
+    space = model.at(Model(model.problem, [*model.terms, *terms], near=model.noise).noise)
+    # the noise is estimated with the effects in the model; at this fixed noise deviances are sums of squares
+    columns = np.concatenate([term.candidate(model.problem).of_blocks for term in terms], axis=-1)
+    drops = _drops(space, Candidate(columns, shared=False, per_unit=field.problem.per_unit))
+    coefficients = sum(rival.rank for rival in rivals), sum(map(freedom, terms))
+    score = _score(drops, *coefficients, field.problem.per_unit)
     largest = np.argsort(drops)[::-1][:_AXES]
     # on the same axes jumps explain at most 1.5 times as much as an effect
     if 1.5 * float(drops[largest].sum()) < score - CLASS_WIDTH:
@@ -87,14 +90,14 @@ def _drops(space: Space, candidate: Candidate) -> Array:
     return drops * max(together / total, 1.0)
 
 
-def _score(drops: Array, rival: Rival, per_unit: int) -> float:
-    """Score of an effect: best of all axes, one axis of all units, and one unit; each penalised for uneven reductions."""
-    nonlinear, by_unit = freedom(rival.term), drops.reshape(-1, per_unit)
+def _score(drops: Array, rank: int, nonlinear: int, per_unit: int) -> float:
+    """Score of effects: best of all axes, one axis of all units, and one unit; each penalised for uneven reductions."""
+    by_unit = drops.reshape(-1, per_unit)
     scores: list[float] = []
     for parts in (by_unit.reshape(1, -1), by_unit.T, by_unit):
         part = parts[int(np.argmax(parts.sum(axis=1)))]
         drop = float(part.sum())
-        paid = price(drop, rival.rank / len(parts) + nonlinear) + 2.0 * float(np.log(len(parts)))
+        paid = price(drop, rank / len(parts) + nonlinear) + 2.0 * float(np.log(len(parts)))
         scores.append(drop - paid + _evenness(part))
     return max(scores)
 

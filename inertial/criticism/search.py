@@ -22,6 +22,7 @@ from inertial.probability import log_chi2_tail
 
 _FINALISTS = 5  # finalists at each noise, for which the noise is estimated again
 _AGAIN = 3  # finalists at each noise when a chosen effect is examined again
+_TOGETHER = 2  # largest number of effects that are added to the best one when jumps explain more than it alone
 _MOST = 6  # largest number of effects of one search
 _AS_MUCH = 1.0  # score by which all columns of an effect must be better than its leading columns alone
 _INEXACT = 0.01  # share of a wrong angle that differs between devices, by their scale factors and misalignments
@@ -66,17 +67,17 @@ def search(
             break
         if isinstance(best.term.effect, Handling):
             return SearchResult(model, tuple(chosen), ladder, (best.term,))
-        jumps = jumps_in_place_of(field, model, best)
-        if jumps is not None and jumps.ahead > 0.0:
-            return SearchResult(model, tuple(chosen), ladder, jumps.terms)
-        best = _parent_first(field, model, best)
-        widened = _with_complete_form(field, model, best, chosen)
+        added, jumps = _added_or_jumps(field, model, best, rivals)
+        if jumps:
+            return SearchResult(model, tuple(chosen), ladder, jumps)
+        widened = _with_complete_form(field, model, added[0], chosen) if len(added) == 1 else None
         if widened is not None:
             chosen = widened
             model = Model(field.problem, [*base.terms, *chosen], near=model.noise)
             continue
-        chosen.append(best.term)
-        model = model.with_term(best.term)
+        for rival in added:
+            chosen.append(rival.term)
+            model = model.with_term(rival.term)
         if len(chosen) > 1:
             model, chosen, handled = _reexamine(field, base, model, chosen)
             if handled is not None:
@@ -84,6 +85,40 @@ def search(
     if len(chosen) > len(start):
         model, chosen = _replaced_by_two(field, base, model, chosen)
     return SearchResult(model, tuple(chosen), ladder)
+
+
+def _added_or_jumps(
+    field: Candidates, model: Model, best: Rival, rivals: Sequence[Rival]
+) -> tuple[list[Rival], tuple[Term, ...]]:
+    """The effects that are added for the best rival, or the jumps of single axes that explain more."""
+    jumps = jumps_in_place_of(field, model, best)
+    if jumps is None or jumps.ahead <= 0.0:
+        return [_parent_first(field, model, best)], ()
+    several = _several_effects(field, model, rivals)
+    return several, () if several else jumps.terms
+
+
+def _several_effects(field: Candidates, model: Model, rivals: Sequence[Rival]) -> list[Rival]:
+    """Two or three effects that together explain more than jumps of single axes; none if there are no such effects.
+
+    Jumps of an axis may imitate several effects at once, such as a bias that follows a polynomial of the temperature.
+    """
+    sets = [[rival] for rival in rivals if not isinstance(rival.term.effect, Handling)][:_FINALISTS]
+    for _ in range(_TOGETHER):
+        larger = [[*effects, further] for effects in sets for further in _another(field, model, effects)]
+        sets = sorted(larger, key=lambda effects: sum(rival.cost for rival in effects))[:1]
+        jumps = jumps_in_place_of(field, model, *sets[0]) if sets else None
+        if sets and (jumps is None or jumps.ahead <= 0.0):
+            return sets[0]
+    return []
+
+
+def _another(field: Candidates, model: Model, effects: Sequence[Rival]) -> list[Rival]:
+    """The best further effect with coefficients for every axis; none if it is not convincing, or an effect is shared."""
+    beside = Model(field.problem, [*model.terms, *(rival.term for rival in effects)], near=model.noise)
+    rivals = contest(field, beside, finalists=_AGAIN)
+    physics = [r for r in rivals if not isinstance(r.term.effect, Handling) and convincing(field, beside, r)]
+    return [] if any(r.term.shared for r in (*effects, *physics[:1])) else physics[:1]
 
 
 def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:

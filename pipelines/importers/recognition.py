@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from inertial import change_of_level
 from inertial.arrays import Array
@@ -217,11 +218,12 @@ def _time(content: Content, guessed: Guesses) -> tuple[Array | None, list[str]]:
             )
         first = numbers[np.isfinite(numbers)][0] if np.any(np.isfinite(numbers)) else 0.0
         time = (numbers - first) * (1.0 / guesses.FINE_HZ if unit == "samples" else TIME_UNITS.get(unit, 1.0))
-    steps = np.diff(time[np.isfinite(time)])
-    if np.any(steps < 0.0) and not guessed.column("dwell"):
-        open_.append(
-            f"time runs back at row {int(np.flatnonzero(steps < 0.0)[0]) + 2}: sort the rows, or divide the file"
-        )
+    # in a table of dwells each unit may have a clock of its own
+    unit = content.table.get(guessed.column("unit") if guessed.dwells else None, 0)
+    rows = pd.DataFrame({"time": time, "unit": unit}).dropna(subset="time")
+    back = rows.index[rows.groupby("unit", dropna=False)["time"].diff() < 0.0]
+    if len(back) and not guessed.column("dwell"):
+        open_.append(f"time runs back at row {int(back[0]) + 1}: sort the rows, or divide the file")
     return time, open_
 
 

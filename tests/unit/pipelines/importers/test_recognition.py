@@ -421,6 +421,8 @@ def test_columns_named_as_in_the_exchange_format_serials_and_numbers_of_dwells_a
     assert dwells is not None
     assert sorted(set(dwells["unit"])) == ["S1", "S2", "S3"]
     assert dwells["dwell"].tolist() == [*range(3, 27)] * 3
+    file.drop(columns=renamed.get("dwell", "dwell")).to_csv(tmp_path / "unnumbered.csv", index=False)
+    assert recognise([tmp_path / "unnumbered.csv"]).open == ()  # each unit has a clock of its own
 
 
 def test_names_of_the_exchange_format_in_a_record_of_samples_are_no_dwells(rng: Rng, tmp_path: Path) -> None:

@@ -1,0 +1,41 @@
+"""The forward search: effects that explain more together than jumps of single axes do."""
+
+import numpy as np
+from each import each
+
+from inertial.criticism.diagnosis import diagnose
+from inertial.estimation.lot import Lot
+from inertial.state import State
+
+
+def temperature_test(bias: str) -> Lot:
+    """Four devices of one axis over seven soaks: their bias follows the square of the temperature, or jumps from soak to soak."""
+    rng, warm = np.random.default_rng(1), np.repeat((-40.0, -10.0, 10.0, 25.0, 40.0, 60.0, 85.0), 6) - 25.0
+    n = warm.size
+    force = np.zeros((n, 3))
+    force[:, 0] = np.tile((1.0, -1.0, 0.0), n // 3)
+    line, square, gain = (
+        4e-5 * rng.normal(size=(4, 1)),
+        4e-7 * rng.normal(1.0, 0.2, (4, 1)),
+        3e-5 * rng.normal(size=(4, 1)),
+    )
+    levels = np.repeat(2e-3 * rng.normal(size=(4, 7)), 6, axis=1)
+    slow = levels if bias == "jumps" else line * warm + square * warm**2
+    output = slow + (1.0 + gain * warm) * force[:, 0] + 1e-4 * rng.normal(size=(4, n))
+    time = 60.0 * np.arange(n) + 1800.0 * np.repeat(np.arange(7), 6)
+    state = State(
+        np.tile(force, (4, 1, 1)),
+        np.tile(time, (4, 1)),
+        np.tile(warm + 25.0, (4, 1)) + 0.1 * rng.normal(size=(4, n)),
+        axes=(0,),
+    )
+    return Lot(state, output[..., None], np.full((4, n, 1), 1e-4), np.tile(np.eye(3), (4, 1, 1)))
+
+
+@each(["polynomial", "jumps"])
+def test_a_bias_that_follows_a_polynomial_of_the_temperature_is_no_jump_of_every_device(bias: str) -> None:
+    found = diagnose(temperature_test(bias), ("bias", "scale"), np.random.default_rng(2))
+    first = {each.effects.members[0].term.effect.id for each in (*found.handled, *found.named)}
+    polynomial = {"bias_temperature", "bias_temperature_quadratic", "scale_temperature"}
+    assert ({"bias_unsteady"} if bias == "jumps" else polynomial) <= first
+    assert ("bias_unsteady" in first) is (bias == "jumps")
