@@ -123,6 +123,14 @@ def test_a_unit_has_figures_and_coefficients_with_u_once_and_residuals_against_w
     assert ('<option value="force" selected>' in page) == adequate
     chart = client.get(f"/unit/figure/residuals.json?run={run.id}&unit=A1&against=time").json()
     assert sum("error_y" in trace for trace in chart["data"]) == 3
+    assert f"tumbleline show {run.id} residuals --archive" in page
+    for path in (run.path / "grades.json", run.path / "grades.parquet", run.report):  # as a fit without limits
+        path.unlink(missing_ok=True)
+    ungraded = client.get(f"/unit?run={run.id}&unit=A1").text
+    assert "No model was fitted" not in ungraded
+    assert f"<code>tumbleline fit {run.id} --limits consumer --archive" in ungraded
+    assert f"<code>tumbleline show {run.id} --report --archive" in client.get(f"/run?run={run.id}").text
+    assert "certificate issue" not in ungraded
 
 
 def cubic_lot(folder: Path) -> WorkbenchSettings:
