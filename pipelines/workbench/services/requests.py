@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from inertial import effects
+from pipelines.archive import Archive
+from pipelines.archive.attributes import attribute_files
 from pipelines.archive.keys import digest
 from pipelines.importers.limited import in_reader
 from pipelines.jobs.model_files import read_model
@@ -145,10 +147,9 @@ def audit(settings: WorkbenchSettings, page: AuditPage) -> Request:
 def discover(settings: WorkbenchSettings, page: DiscoverPage) -> Request:
     """What the lots of the archive show together."""
     return "discoveries in the archive", {
-        "archive": settings.archive,
-        "stamp": sources.archive_stamp(settings),
-        "device": page.device,
-    }
+        "archive": settings.archive, "stamp": sources.archive_stamp(settings), "device": page.device,
+        "attributes": len(attribute_files(Archive(settings.archive))),
+    }  # fmt: skip
 
 
 def bring_in(settings: WorkbenchSettings, page: UploadPage) -> Request:

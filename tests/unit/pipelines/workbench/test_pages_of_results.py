@@ -63,10 +63,12 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
 
 def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = wafer_line(tmp_path)
+    _, without = requests.discover(settings_of(made.folder, tmp_path), DiscoverPage())
     add_attributes(Archive(str(made.folder)), pd.read_csv(made.units, dtype=str), "serial", "units.csv")
     client = client_of(made.folder, tmp_path)
     assert client.get("/discover").status_code == 200  # before it was asked for
     _, content = requests.discover(settings_of(made.folder, tmp_path), DiscoverPage())
+    assert content != without  # attributes make another result
     end, found = done_in_process("discover", content, lambda *_: None)
     assert end == "done", found
     monkeypatch.setattr(Jobs, "result", lambda *_: found)
