@@ -127,21 +127,15 @@ def what_if(settings: WorkbenchSettings, page: ModelsPage) -> Request:
     """The lots of the archive with a model beside their own."""
     path = models.path_of(settings, page.model)
     return f"what if {path.stem}", {
-        "archive": settings.archive,
-        "model": str(path),
-        "stamp": path.stat().st_mtime_ns,
+        "archive": settings.archive, "model": str(path), "stamp": path.stat().st_mtime_ns,
         "runs": sources.archive_stamp(settings),
-    }
+    }  # fmt: skip
 
 
 def audit(settings: WorkbenchSettings, page: AuditPage) -> Request:
     """The audit of the archive."""
-    names = ("since", "until", "device", "station")
-    return "audit of the archive", {
-        "archive": settings.archive,
-        "stamp": sources.archive_stamp(settings),
-        **{name: getattr(page, name) for name in names},
-    }
+    content = page.model_dump(include={"since", "until", "device", "station"})
+    return "audit of the archive", content | {"archive": settings.archive, "stamp": sources.archive_stamp(settings)}
 
 
 def discover(settings: WorkbenchSettings, page: DiscoverPage) -> Request:
