@@ -93,8 +93,9 @@ def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
         try:
             effects.get(name)
         except UnknownEffect as problem:
+            own = "" if problem.close else "; one of a Python file needs --effect-file FILE.py, or its package"
             raise RecipeInvalid(
-                f"{where}: unknown effect '{shown(name)}'; {did_you_mean(name, effects.catalogue())}",
+                f"{where}: unknown effect '{shown(name)}'; {did_you_mean(name, effects.catalogue())}{own}",
                 key="effects",
                 close=problem.close,
             ) from None

@@ -3,6 +3,7 @@
 import hashlib
 import math
 import secrets
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -134,6 +135,7 @@ def page(
     bench = workbench_of(request)
     text = _environment().get_template(template).render(
         state=state, problems=problems or [], bench=bench, command=state.command(bench.settings.archive),
+        line=lambda *words: shlex.join(["tumbleline", *words, "--archive", bench.settings.archive]),
         may_change=bool(getattr(request.state, "may_change", False)), static=static_version(), path=request.url.path,
         number=significant, micro=MICRO, finite=math.isfinite, **values,
     )  # fmt: skip

@@ -172,8 +172,8 @@ class UnitPage(PageState):
     parameter: Text = "bias x"
 
     def arguments(self) -> list[str]:
-        """The table of residuals."""
-        return ["show", self.run, "residuals"]
+        """The table of residuals; the summary of a run without them."""
+        return ["show", self.run, "residuals"] if self.against else ["show", self.run]
 
 
 class MissingPage(PageState):

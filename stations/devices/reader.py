@@ -62,10 +62,10 @@ class Reader:
         registers = self._registers
         if registers.text("sampling") != "stopped":
             self.stop()
-        if abs(registers.number("rate") - rate_hz) > RATE_HZ:
+        if not abs(registers.number("rate") - rate_hz) <= RATE_HZ:  # NaN, too
             registers.write("rate", rate_hz)
             actual = registers.number("rate")
-            if abs(actual - rate_hz) > RATE_HZ:
+            if not abs(actual - rate_hz) <= RATE_HZ:
                 raise StationRefused(
                     f"{registers.name}: samples at {actual:g} Hz, {rate_hz:g} Hz is needed; choose a supported rate"
                 )

@@ -177,7 +177,7 @@ class TableAxis(ABC):
     def confirm(self, target: float) -> None:
         """Refuses to continue where the encoder reads another angle than the target."""
         angle = self.position()
-        if abs(angle - target) > self._tolerance():
+        if not abs(angle - target) <= self._tolerance():
             raise OperatorNeeded(
                 f"{self.name}: stands at {angle:.4f} deg, {target:g} ± {self._limits.position_deg:g} deg is needed; "
                 "check the load and the brake of the table"

@@ -25,12 +25,8 @@ from schemas.errors import TumblelineError, WrongUse
 
 router = APIRouter()
 SHOWN = (
-    "residual_rms_ug",
-    "verification_norm_ug",
-    "bias_error_ug",
-    "velocity_random_walk_ug_rtHz",
-    "bias_instability_ug",
-)
+    "residual_rms_ug", "verification_norm_ug", "bias_error_ug", "velocity_random_walk_ug_rtHz", "bias_instability_ug",
+)  # fmt: skip
 HEADS = ("fit residual, rms, µg", "verification error of |a|, µg", "error, rms, µg", "N, µg/√Hz", "B, µg")
 """Heads of the columns of these figures."""
 MOST_OTHERS = 50

@@ -35,14 +35,8 @@ def two_models(request: Request) -> Response:
         works = [("diagnose", side) for side in sides] + [("coefficients", state)]
         results = [bench.work(kind, content, problems) for kind, content in works]
         *found, rows = [result for result, _ in results]
-        waiting = next(
-            (
-                (kind, content, job)
-                for (kind, content), (result, job) in zip(works, results, strict=True)
-                if result is None
-            ),
-            None,
-        )
+        pending = ((*work, job) for work, (result, job) in zip(works, results, strict=True) if result is None)
+        waiting = next(pending, None)
     except TumblelineError as problem:
         problems.append(str(problem))
     table = next(

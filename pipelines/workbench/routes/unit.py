@@ -58,16 +58,16 @@ def unit(request: Request) -> Response:
     }
     grade = next(iter(rows.get("grades", [])), None)
     history = _history(bench, state.unit)
-    drivers: dict[str, str] = {}
+    fitted = "residuals" in tables and (grade is None or grade["outcome"] != "refused")
     parameters = list(dict.fromkeys(_parameter(row) for row in history))
     if parameters and state.parameter not in parameters:
         state = state.model_copy(update={"parameter": parameters[0]})
-    if "residuals" in tables and grade is not None and grade["outcome"] != "refused":
-        state = state.model_copy(update={"against": _against(bench, state)})
-        drivers = run_pictures.quantities(_table(bench, state, "residuals"), _table(bench, state, "dwells"))
+    state = state.model_copy(update={"against": _against(bench, state) if fitted else ""})
+    both = [_table(bench, state, name) for name in ("residuals", "dwells")] if fitted else []
     index = units.index(state.unit)
     return page(
-        request, "unit.html", state, problems, run=run, grade=grade, rows=rows, tables=tables, units=units, drivers=drivers,
+        request, "unit.html", state, problems, run=run, grade=grade, rows=rows, tables=tables, units=units,
+        drivers=run_pictures.quantities(*both) if both else {},
         before=units[index - 1] if index else "", after=units[index + 1] if index + 1 < len(units) else "",
         coefficients=side_by_side(rows.get("coefficients", []), _expanded), parameters=parameters,
         coverage=coverage_of(run.about),

@@ -75,12 +75,10 @@ def _serve(pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server decides when its processes end
     from pipelines.workbench.services.work import done_in_process
 
-    while True:
-        try:
+    with suppress(EOFError, OSError):  # the server ended
+        while True:
             kind, request = pipe.recv()
-        except (EOFError, OSError):
-            return
-        pipe.send(done_in_process(kind, request, lambda *how_far: pipe.send(("progress", how_far))))
+            pipe.send(done_in_process(kind, request, lambda *how_far: pipe.send(("progress", how_far))))
 
 
 class Jobs:

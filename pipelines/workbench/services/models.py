@@ -97,6 +97,11 @@ def save(
         text, after = with_effects(text, steps, path)
         if after is None and path.is_file():
             raise WrongUse(f"model: {path} has these effects already; nothing was written")
+        if after is not None and (differs := {*after.model.effects} ^ {*start, *added}):
+            raise WrongUse(
+                f"model: with this step {path} has other effects than were judged on this page ({', '.join(sorted(differs))}); "
+                "give another name, or begin with the model of this file"
+            )
         path.parent.mkdir(parents=True, exist_ok=True)
         publish_model(path, text)
     return path, after.model.version if after else 1

@@ -5,9 +5,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from inertial import effects
+from pipelines.archive import Archive
+from pipelines.archive.attributes import attribute_files
+from pipelines.archive.keys import digest
 from pipelines.importers.limited import in_reader
 from pipelines.jobs.model_files import read_model
 from pipelines.workbench.services import models, sources, uploads
+from pipelines.workbench.services.work import recipe_of
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import (
     AuditPage,
@@ -95,7 +100,6 @@ def _starting_model(archive: str, name: str, stamp: str) -> tuple[str, ...]:
 
 def default_model_of(archive: str, name: str) -> tuple[str, ...]:
     """The default model of a diagnosis of dwells, by this process."""
-    from inertial import effects
     from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.inputs import judged_effects
     from pipelines.importers.exchange import read_dwells
@@ -107,43 +111,39 @@ def default_model_of(archive: str, name: str) -> tuple[str, ...]:
 
 def plan(settings: WorkbenchSettings, page: PlanPage) -> Request:
     """The plan of a recipe."""
-    known, path = recipes(settings), Path(page.recipe)
+    known = recipes(settings)
     if page.recipe not in known:
         raise WrongUse(f"plan: no recipe is called '{page.recipe[:60]}'; {did_you_mean(page.recipe, known)}")
-    return f"plan of {page.recipe}", {
+    content: dict[str, Any] = {
         "archive": settings.archive, "recipe": page.recipe, "effects": list(page.effects), "pose": list(page.pose),
-        "station": str(settings.station or ""), "stamp": path.stat().st_mtime_ns if path.is_file() else 0,
+        "station": str(settings.station or ""),
     }  # fmt: skip
+    with effects.additions_forgotten():
+        parts = recipe_of(content)  # with the model of its file or of the line, which may change without the recipe
+    return f"plan of {page.recipe}", content | {"stamp": digest([part.model_dump(mode="json") for part in parts])}
 
 
 def what_if(settings: WorkbenchSettings, page: ModelsPage) -> Request:
     """The lots of the archive with a model beside their own."""
     path = models.path_of(settings, page.model)
     return f"what if {path.stem}", {
-        "archive": settings.archive,
-        "model": str(path),
-        "stamp": path.stat().st_mtime_ns,
+        "archive": settings.archive, "model": str(path), "stamp": path.stat().st_mtime_ns,
         "runs": sources.archive_stamp(settings),
-    }
+    }  # fmt: skip
 
 
 def audit(settings: WorkbenchSettings, page: AuditPage) -> Request:
     """The audit of the archive."""
-    names = ("since", "until", "device", "station")
-    return "audit of the archive", {
-        "archive": settings.archive,
-        "stamp": sources.archive_stamp(settings),
-        **{name: getattr(page, name) for name in names},
-    }
+    content = page.model_dump(include={"since", "until", "device", "station"})
+    return "audit of the archive", content | {"archive": settings.archive, "stamp": sources.archive_stamp(settings)}
 
 
 def discover(settings: WorkbenchSettings, page: DiscoverPage) -> Request:
     """What the lots of the archive show together."""
     return "discoveries in the archive", {
-        "archive": settings.archive,
-        "stamp": sources.archive_stamp(settings),
-        "device": page.device,
-    }
+        "archive": settings.archive, "stamp": sources.archive_stamp(settings), "device": page.device,
+        "attributes": len(attribute_files(Archive(settings.archive))),
+    }  # fmt: skip
 
 
 def bring_in(settings: WorkbenchSettings, page: UploadPage) -> Request:

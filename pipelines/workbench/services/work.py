@@ -53,6 +53,8 @@ def done_in_process(kind: str, request: Mapping[str, Any], report_progress: Repo
             return "done", WORK[kind](request, report_progress)
     except (TumblelineError, InertialError) as problem:
         return "failed", str(problem)
+    except BrokenPipeError:  # the server ended: nobody waits for the result
+        raise
     except Exception as problem:  # noqa: BLE001 - a defect: the page says so, the details go to the server's log
         traceback.print_exc()
         defect = f"a defect of the program ({type(problem).__name__}: {problem}); the server's log has the details"

@@ -18,6 +18,7 @@ from schemas.station import Soak, StationConfig, load_station, with_faults
 from schemas.station_devices import Device, Equipment
 from schemas.vibration_profile import load_vibration_profile
 from stations import open_station
+from stations.devices.registers import Registers
 from stations.plant.families.scpi_generator import Generator
 from stations.profile_files import profile_of
 from stations.safety.suspenders import Watched
@@ -116,6 +117,15 @@ def test_a_maximum_of_the_station_file_bounds_every_order(row: tuple[str, str, s
         device.values.write(name, value)
         with pytest.raises(StationRefused, match="is allowed"):
             device.values.write(name, 1.01 * value)
+
+
+def test_a_reading_that_is_no_number_agrees_with_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_station(load_station(), lot_of(1)) as station, monkeypatch.context() as patch:
+        patch.setattr(Registers, "number", lambda *_: math.nan)
+        with pytest.raises(StationRefused, match="samples at nan Hz, 100 Hz is needed"):
+            station.reader.start(100.0)
+        with pytest.raises(OperatorNeeded, match="stands at nan deg"):
+            station.table.axes["outer"].confirm(10.0)
 
 
 def test_a_supply_keeps_below_the_absolute_maximum_of_the_devices() -> None:

@@ -63,10 +63,12 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
 
 def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = wafer_line(tmp_path)
+    _, without = requests.discover(settings_of(made.folder, tmp_path), DiscoverPage())
     add_attributes(Archive(str(made.folder)), pd.read_csv(made.units, dtype=str), "serial", "units.csv")
     client = client_of(made.folder, tmp_path)
     assert client.get("/discover").status_code == 200  # before it was asked for
     _, content = requests.discover(settings_of(made.folder, tmp_path), DiscoverPage())
+    assert content != without  # attributes make another result
     end, found = done_in_process("discover", content, lambda *_: None)
     assert end == "done", found
     monkeypatch.setattr(Jobs, "result", lambda *_: found)
@@ -123,6 +125,14 @@ def test_a_unit_has_figures_and_coefficients_with_u_once_and_residuals_against_w
     assert ('<option value="force" selected>' in page) == adequate
     chart = client.get(f"/unit/figure/residuals.json?run={run.id}&unit=A1&against=time").json()
     assert sum("error_y" in trace for trace in chart["data"]) == 3
+    assert f"tumbleline show {run.id} residuals --archive" in page
+    for path in (run.path / "grades.json", run.path / "grades.parquet", run.report):  # as a fit without limits
+        path.unlink(missing_ok=True)
+    ungraded = client.get(f"/unit?run={run.id}&unit=A1").text
+    assert "No model was fitted" not in ungraded
+    assert f"<code>tumbleline fit {run.id} --limits consumer --archive" in ungraded
+    assert f"<code>tumbleline show {run.id} --report --archive" in client.get(f"/run?run={run.id}").text
+    assert "certificate issue" not in ungraded
 
 
 def cubic_lot(folder: Path) -> WorkbenchSettings:

@@ -2,11 +2,13 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
 from dataclasses import replace
 from importlib.resources import files
+from multiprocessing import Pipe
 from pathlib import Path
 
 import pandas as pd
@@ -18,10 +20,11 @@ from pipelines.jobs.job import Request
 from pipelines.jobs.model_files import read_model
 from pipelines.workbench.routes.operator import station_named, stations_of
 from pipelines.workbench.services import jobs as job_table
-from pipelines.workbench.services import lots, models, sources, uploads
-from pipelines.workbench.services.jobs import Jobs
+from pipelines.workbench.services import lots, models, requests, sources, uploads
+from pipelines.workbench.services.jobs import Jobs, _serve
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
+from pipelines.workbench.state import PlanPage
 from schemas.errors import TumblelineError, WrongUse
 
 
@@ -44,6 +47,11 @@ def test_a_stopped_job_ends_its_process_and_the_next_one_runs_is_shared_and_fail
     state, text = done_in_process("diagnose", {}, lambda *_: None)  # a defect does not end the process
     assert (state, "defect" in text) == ("failed", True)
     assert "Traceback" in capsys.readouterr().err
+    server, worker = Pipe()
+    server.send(("diagnose", {}))
+    server.close()
+    _serve(worker)  # of a server that was killed: without a word
+    assert capsys.readouterr().err == ""
     table = Jobs(tmp_path / "jobs.json", workers=1)
     request = {"recipe": "production", "effects": [], "station": "", "archive": str(tmp_path)}
     job = table.submit("plan", "a plan", request)
@@ -199,6 +207,14 @@ def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Workben
     )
     with pytest.raises(WrongUse, match="already"):
         models.save(settings, "line-1", start, ["third_order"], [], "again", "run-8")
+    with pytest.raises(WrongUse, match="other effects"):
+        models.save(settings, "line-1", [*start, "misalignment"], ["cross_coupling"], [], "of another model", "run-8")
+    recipe, sample = settings.folder / "six.toml", Path(__file__).parents[4] / "deploy/recipes/line-six.toml"
+    recipe.write_text(re.sub(r"effects = .*", f'model = "{place}"', sample.read_text()))
+    before = requests.plan(settings, PlanPage(recipe=str(recipe)))[1]
+    added = ["third_order", "humid", "second_order", "cross_coupling"]
+    assert models.save(settings, "line-1", start, added, formulas, "more", "run-8")[1] == 5
+    assert requests.plan(settings, PlanPage(recipe=str(recipe)))[1] != before  # the recipe's file is as it was
     for name, why in (("../x", "a reason"), ("ok", "  "), ("", "a reason")):
         with pytest.raises(WrongUse):
             models.save(settings, name, start, ["third_order"], [], why, "")
