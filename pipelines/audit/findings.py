@@ -146,14 +146,14 @@ def _incapable(audit: Audit) -> Iterator[AuditFinding]:
     for able in audit.abilities:
         if able.ppk.low < audit.rules.ppk_least:
             limit = f"{able.limit:g}" if able.unit_text == "1" else f"{able.limit:g} {able.unit_text}"
+            more = "measure more units, " if able.ppk.value >= audit.rules.ppk_least else ""
             message = (
-                f"{able.device}: {figure_label(able.figure)} has Ppk {able.ppk.value:.2f} "
-                f"({able.ppk.low:.2f} to {able.ppk.high:.2f}) against {limit}, at least {audit.rules.ppk_least:g} is needed; "
-                f"{100 * able.outside.value:.2g} % are outside: reduce the spread, or widen the limit"
+                f"{able.device}: {figure_label(able.figure)} has Ppk {able.ppk.value:.2f} (95 % interval {able.ppk.low:.2f} to "
+                f"{able.ppk.high:.2f}, whose lower end must be at least {audit.rules.ppk_least:g}) against {limit}; "
+                f"{100 * able.outside.value:.2g} % are outside: {more}reduce the spread, or widen the limit"
             )
-            interval = {"ppk": able.ppk.value, "low": able.ppk.low, "high": able.ppk.high}
-            evidence = {"figure": able.figure, **interval, "n": able.n}
-            yield AuditFinding("product", "capability", able.device, message, (), evidence)
+            evidence = {"figure": able.figure, "ppk": able.ppk.value, "low": able.ppk.low, "high": able.ppk.high}
+            yield AuditFinding("product", "capability", able.device, message, (), {**evidence, "n": able.n})
 
 
 def _different(audit: Audit) -> Iterator[AuditFinding]:

@@ -22,6 +22,7 @@ from pipelines.audit.run_rows import SCHEMAS
 from pipelines.audit.tables_in_memory import QueryResult, rows_of_index
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.library import library
+from schemas.tables import TABLES
 
 if TYPE_CHECKING:
     import duckdb
@@ -37,11 +38,7 @@ BLANK = r"(?:\s|--[^\n]*\n|/\*(?:[^*]|\*(?!/))*\*/)*"
 EXPLAINS = re.compile(  # the beginning of an EXPLAIN with its options, with comments between the words
     rf"{BLANK}EXPLAIN\b{BLANK}(?:ANALY[SZ]E\b|\((?=\s*(?:ANALY[SZ]E|FORMAT)\b)[\w\s',]*\))?", re.IGNORECASE
 )
-FILES: tuple[str, ...] = (  # tables of the runs that are read in place
-    "dwells", "residuals", "readings", "history", "verdicts", "covariance", "predictions", "wander", "verification",
-    "verification_poses", "allan", "noise", "grades",
-)  # fmt: skip
-READERS = 8  # of files
+FILES = tuple(name for name in TABLES if name not in {*SCHEMAS, "samples"})  # tables of the runs that are read in place
 VIEWS = (*SCHEMAS, *FILES, "calibrations")
 WORD = re.compile(r"[A-Za-z_]\w*")
 
@@ -132,6 +129,8 @@ def _explained(problem: duckdb.Error) -> str:
     unknown = re.search(r"Table with name (\S+) does not exist", text)
     if unknown:
         return f"query: no view is called '{unknown[1]}', one of the archive's is needed; {did_you_mean(unknown[1], VIEWS)}"
+    if "Referenced column" in text:  # the index has the columns that an audit reads
+        return f"query: {text}; correct the query, or give --no-index for every column of coefficients and figures"
     return f"query: {text}; correct the query (views: {', '.join(VIEWS)})"
 
 
@@ -180,7 +179,7 @@ def datasets_of_runs(paths: Sequence[Path]) -> ds.Dataset:
     """
     from pyarrow.fs import LocalFileSystem
 
-    with ThreadPoolExecutor(READERS) as pool:
+    with ThreadPoolExecutor(8) as pool:
         file_schemas = list(pool.map(_schema, paths))
     try:
         columns = pa.unify_schemas(file_schemas, promote_options="permissive").remove_metadata()

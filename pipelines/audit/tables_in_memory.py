@@ -24,7 +24,10 @@ class QueryResult:
     rows: list[tuple[Any, ...]]
 
     def documents(self) -> list[dict[str, Any]]:
-        """The rows by column name."""
+        """The rows by column name, which must differ."""
+        twice = next((name for name in self.columns if self.columns.count(name) > 1), None)
+        if twice is not None:
+            raise WrongUse(f"query: two columns are called '{twice}', names that differ are needed; rename one with AS")
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
 
 

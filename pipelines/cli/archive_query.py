@@ -45,10 +45,8 @@ def query(
         writer.writerows(answer.rows)
         print_text(text.getvalue()) if printed else publish(output, text.getvalue(), "answer")
     if as_json:
-        rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
-        print_json({"columns": list(answer.columns), "rows": rows})
-        return
-    if output is not None:
+        print_json({"columns": list(answer.columns), "rows": answer.documents()})
+    if as_json or output is not None:
         return
     print_table(
         list(answer.columns), [["" if value is None else cell(value) for value in row] for row in answer.rows[:MANY]]

@@ -25,10 +25,11 @@ from pipelines.audit.document import document
 from pipelines.audit.findings import findings
 from pipelines.audit.index import up_to_date
 from pipelines.audit.rules import load_rules
-from pipelines.audit.sql import ask
+from pipelines.audit.sql import VIEWS, ask
 from pipelines.flows.local import local_server
 from pipelines.tables.json_values import json_value
 from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
+from schemas.tables import TABLES
 
 UNTIL = "2022-01-31"
 NAMESPACES = ("www.w3.org", "purl.org", "creativecommons.org")
@@ -119,6 +120,7 @@ def test_every_way_to_read_is_answered_and_sees_the_same_from_index_and_files(ma
     archive = Archive(made)
     assert ask(archive, question).rows == ask(archive, question, compact=False).rows
     assert [read for read in READS if not ask(archive, read).rows] == []
+    assert {*TABLES} - {*VIEWS} == {"samples"}
     counted = ask(archive, "SELECT count(*), count(DISTINCT run) FROM dwells").rows[0]
     assert counted == (sum(len(archive.run(info.id).table("dwells")) for info in archive.runs()), 24)
 
@@ -126,7 +128,7 @@ def test_every_way_to_read_is_answered_and_sees_the_same_from_index_and_files(ma
 UNANSWERED = {
     "SELECT * FROM grade": "did you mean grades?",
     "SELEC 1": "syntax error",
-    "SELECT nothing FROM runs": "nothing",
+    "SELECT pfa FROM figures": "--no-index for every column of coefficients and figures",
     "": "no statement",
     "EXPLAIN ANALYZE CREATE TABLE t AS SELECT 1": "found explain of create",
     "SELECT * FROM archive": "no view is called 'archive'",  # a variable of the caller is no view
@@ -184,6 +186,8 @@ def test_the_query_command_prints_a_table_json_and_csv(made):
     assert given(*words, "--output", "-")[1].splitlines()[:2] == ["station,n", "line-1,6"]
     assert "line-1" in text_of(*words)
     refused(*words, "--output", "-", "--json")
+    joined = "SELECT g.outcome, f.outcome FROM grades g JOIN figures f USING (run, unit)"
+    assert "two columns are called 'outcome'" in refused("archive", "query", joined, "--archive", made, "--json")
 
 
 def test_what_cannot_be_audited_is_refused(made, tmp_path):

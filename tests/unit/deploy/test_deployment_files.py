@@ -245,6 +245,7 @@ def test_a_drop_in_of_a_plant_changes_its_unit_without_a_remark_of_systemd(name:
     base = {"server.conf": "tumbleline-server", "worker.conf": WORKER}[name]
     text = (DEPLOY / "plant" / name).read_text(encoding="utf-8")
     assert "PASSWORD@" not in re.sub(r"^#.*$", "", text, flags=re.MULTILINE)
+    assert all(find_spec(module) for module in re.findall(r"python -m (\S+)", text))
     assert set(re.findall(r"^(\w+)=", text, re.MULTILINE)) <= {
         "After", "LoadCredential", "ExecStart", "IPAddressAllow", "Environment",
     }  # fmt: skip

@@ -5,6 +5,8 @@ import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,13 +16,15 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.generated_archive import write_archive
 from benchmarks.generated_ledger import write_ledger
+from inertial.population.capability import Index as Capability
 from pipelines.archive import Archive
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import IMPORTED, Calibrations, date_of, day_of
 from pipelines.audit.due import due, last_measured
 from pipelines.audit.exchanged_serials import strangers
-from pipelines.audit.findings import findings
+from pipelines.audit.findings import _incapable, findings
 from pipelines.audit.parameters import NAMES
+from pipelines.audit.population import Ability
 from pipelines.audit.rules import load_rules
 from pipelines.audit.unit_findings import of_small_kinds, twice
 
@@ -49,6 +53,13 @@ def test_one_serial_on_two_kinds_or_stations_within_minutes_is_two_units_and_on_
     assert list(twice(at_once)) == ["A"]
     again = calibrations(("A", "X", "s", 10.0), ("A", "X", "s", 10.002))  # the same station began once more
     assert twice(again) == {}
+
+
+@pytest.mark.parametrize(("ppk", "remedy"), [(1.5, "outside: measure more units, reduce"), (0.9, "outside: reduce")])
+def test_a_ppk_that_few_units_leave_open_asks_for_more_units(ppk: float, remedy: str) -> None:
+    bounds = Capability(ppk, 0.8, 2.1)
+    able = Ability("ADXL355", "bias_error_ug", "µg", 1000.0, False, 20, 500.0, bounds, None, Capability(0.0, 0.0, 0.17))
+    assert remedy in next(_incapable(cast("Any", SimpleNamespace(abilities=[able], rules=RULES)))).message
 
 
 def test_exchanged_serials_are_told_among_four_units_and_no_change_of_a_unit_is(rng: np.random.Generator) -> None:
