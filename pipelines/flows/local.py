@@ -37,7 +37,7 @@ from pipelines.orchestrator.settings import (
 from pipelines.parallel import with_environment
 from pipelines.schedule.steps import steps
 from schemas import host
-from schemas.errors import ArchiveUnusable, StationTimeout, TumblelineError
+from schemas.errors import ArchiveUnusable, LinkLost, StationTimeout, TumblelineError
 from schemas.installed import missing_in
 from schemas.progress import Progress
 
@@ -85,7 +85,7 @@ def run_locally(
 @contextmanager
 def flow_run(archive: Archive, name: str, meanwhile: Callable[[], None] = lambda: None) -> Generator[str]:
     """A block for one flow run of a name, with the address by which it finds an archive; its history is complete at the end."""
-    with reached(_home(archive), meanwhile):
+    with reached(_home(archive), meanwhile), _answering():
         from pipelines.flows.calibrate import settle_history
         from pipelines.orchestrator.dead_runs import close_dead_runs
 
@@ -93,6 +93,18 @@ def flow_run(archive: Archive, name: str, meanwhile: Callable[[], None] = lambda
         with named(archive) as address:
             yield address
         settle_history(name, len(ORDER))
+
+
+@contextmanager
+def _answering() -> Generator[None]:
+    """A block whose orchestrator may end: the user is told what to do."""
+    from httpx import TransportError
+
+    try:
+        yield
+    except TransportError as problem:
+        fault = f"{os.environ['PREFECT_API_URL']} no longer answers ({problem}), a running server is needed"
+        raise LinkLost(f"orchestrator: {fault}; start it, and give the command again to continue") from None
 
 
 def _prepare(job: Job) -> None:

@@ -17,11 +17,13 @@ from pathlib import Path
 import pytest
 import websockets
 from each import each
+from httpx import ConnectError
 from in_process import refused
 from orchestrator import Orchestrator, client_of, served
 from root_process import ROOT
 
 from pipelines.doctor.orchestrator import orchestrator_checks
+from pipelines.flows import local
 from pipelines.flows.deploy import register
 from pipelines.orchestrator.archive_address import REFUSED
 from pipelines.orchestrator.dead_runs import close_dead_runs_of_queue
@@ -197,6 +199,8 @@ def test_a_client_with_no_key_a_wrong_one_or_no_server_is_told(
     monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
     with pytest.raises(LinkLost, match="does not answer"):
         check_server()
+    with pytest.raises(LinkLost, match="no longer answers"), local._answering():
+        raise ConnectError("refused")  # as of a server that was killed since
 
 
 def sent(line: Orchestrator, path: str, size: int, key: str, *, chunked: bool) -> int:
