@@ -17,10 +17,11 @@ from pipelines.cli.options import (
     option,
     set_option,
     settings,
+    stated_device,
 )
 from pipelines.cli.printing import conclude, error_console, print_table, say, short, short_values
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
-from schemas.errors import WrongUse, close_matches, did_you_mean
+from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.tables import ADEQUATE, NOT_JUDGED
 
@@ -34,7 +35,6 @@ EXAMPLES = (
 
 WAVEFORMS = ("reference", "x", "y", "z")
 """Channels that make an import of a sweep one of waveforms, not of points."""
-LONGEST_DEVICE = 64
 METHODS = ("norm", "plane", "faces", "temperature")
 
 
@@ -150,7 +150,7 @@ def command(
         **given,
     }
     keys |= {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
-    device, slip = _device(str(keys.get("device", "")))
+    device, slip = stated_device(str(keys.get("device", "")))
     keys |= {"device": device} if device else {}
     if fit and fit not in METHODS:
         raise WrongUse(
@@ -203,7 +203,7 @@ def _transfer(
         raise WrongUse("import: no serial number, a transfer function needs one; add --units SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
     layout = stated_layout(*stated)
-    device, slip = _device(device)
+    device, slip = stated_device(device)
     imported = [import_transfer(path, unit, model, archive, layout, device) for path in files]
     for transfer in imported:
         transfer["text"] += slip
@@ -236,29 +236,12 @@ def _waveforms(
         raise WrongUse("import: no serial number, the recordings of a test need one; add --units SN")
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
-    device, slip = _device(device)
+    device, slip = stated_device(device)
     imported = import_waveforms(paths, procedure, part, unit, layout, archive, device)
     imported["text"] += slip
     held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
     passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
     conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
-
-
-def _device(name: str) -> tuple[str, tuple[str, ...]]:
-    """The kind of device that an import states, a preset as it is spelled; and what is to be said of the name."""
-    if not name:
-        return "", ()
-    from stations.plant.preset import preset_names
-
-    if not (name.isprintable() and name == name.strip() and len(name) <= LONGEST_DEVICE):
-        raise WrongUse(
-            f"--device: found '{shown(name)}', 1 to {LONGEST_DEVICE} printable characters are needed; correct it"
-        )
-    known = preset_names()
-    spelled = next((preset for preset in known if preset.lower() == name.lower()), name)
-    close = close_matches(name, known) if spelled not in known else ()
-    slip = f"device: {spelled} is not one that the program knows; {did_you_mean(name, close)} Then import again with it"
-    return spelled, (slip,) if close else ()
 
 
 def _named(units: Sequence[str], device: str | None) -> str:

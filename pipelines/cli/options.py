@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
 
 
@@ -271,3 +271,21 @@ WorkersOption = Annotated[
 ]
 SimulatedDeviceOption = Annotated[str, option("--device", "Preset of the simulated devices under test.")]
 SimulatedUnitsOption = Annotated[int, option("--slots", "Number of simulated devices in the slots.", min=1, max=32)]
+_LONGEST_DEVICE = 64
+
+
+def stated_device(name: str, again: str = "import again with it") -> tuple[str, tuple[str, ...]]:
+    """The kind of device that ``--device`` states, a preset as it is spelled; and what is to be said of the name."""
+    if not name:
+        return "", ()
+    from stations.plant.preset import preset_names
+
+    if not (name.isprintable() and name == name.strip() and len(name) <= _LONGEST_DEVICE):
+        raise WrongUse(
+            f"--device: found '{shown(name)}', 1 to {_LONGEST_DEVICE} printable characters are needed; correct it"
+        )
+    known = preset_names()
+    spelled = next((preset for preset in known if preset.lower() == name.lower()), name)
+    close = close_matches(name, known) if spelled not in known else ()
+    slip = f"device: {spelled} is not one that the program knows; {did_you_mean(name, close)} Then {again}"
+    return spelled, (slip,) if close else ()

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from pipelines.archive import Archive
 from pipelines.cli.groups import group
-from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, ReasonOption, argument, option
+from pipelines.cli.options import (
+    ArchiveOption,
+    EffectFileOption,
+    JsonOption,
+    ReasonOption,
+    argument,
+    option,
+    stated_device,
+)
 from pipelines.cli.printing import give, print_table, say
 from pipelines.cli.release_whatif import whatif
 from schemas.errors import WrongUse
@@ -66,12 +74,14 @@ def model(
             "'tumbleline release' alone for the list"
         )
     change = change_from_options("", file, "", effect_file, where="release")
+    device, slip = stated_device(device, "release it for that kind")
     first = moment(since, "--since")
     record = publish(store, change, first, device=device, station=station, reason=reason, force=force)
     lines = [
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
         f"  {', '.join(record.model.effects or ())}",
         f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
+        *(f"  {line}" for line in slip),
     ]
     give({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
 

@@ -1,6 +1,8 @@
-"""Releases and calibrations of an archive are files with numbers for names; others are not looked at."""
+"""Releases and calibrations of an archive are files with numbers for names; a misspelt kind of device is told."""
 
 from pathlib import Path
+
+from in_process import text_of
 
 from pipelines.archive import Archive
 from pipelines.archive.cleaning import clean
@@ -15,3 +17,13 @@ def test_a_superscript_digit_is_no_number_of_a_file(tmp_path: Path) -> None:
         (archive.root / folder / "².json").write_text("{}", encoding="utf-8")
     assert releases(archive) == []
     assert clean(archive).anchored == 0
+
+
+def test_a_release_for_a_kind_of_device_that_is_nearly_a_known_one_says_so(tmp_path: Path) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text('[model]\nname = "few"\nversion = 1\neffects = ["bias", "scale"]\n', encoding="utf-8")
+    words = ("release", model, "--since", "2026-01-01", "--force", "--reason", "a test", "--archive", tmp_path / "a")
+    said = [text_of(*words, "--device", kind, status=0) for kind in ("ADXL35", "adxl355", "house make 7")]
+    assert "ADXL35 is not one that the program knows; did you mean ADXL355?" in said[0]
+    assert "for ADXL355 from" in said[1]
+    assert not any("not one that" in text for text in said[1:])
