@@ -156,6 +156,11 @@ def of_content(
     keys |= {"gaps": "split"} if gaps or not bool(finite.all()) else {}
     keys |= {"faulty": "leave-out"} if faults else {}
     open_ += _open(guessed, samples)
+    serials = content.table.get(guessed.column("unit"), pd.Series()).dropna().unique()
+    if len(serials) > 1 and not guessed.dwells:
+        open_ = [
+            f"samples of {len(serials)} units, one is needed: divide the file by its column '{guessed.column('unit')}'"
+        ]
     return Recognition(
         tuple(paths), content, source, guessed, False, clock, samples, gaps, _rate(clock), stops, faults, tuple(open_), keys,
         labels, joints,

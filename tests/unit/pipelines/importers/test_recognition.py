@@ -434,6 +434,8 @@ def test_names_of_the_exchange_format_in_a_record_of_samples_are_no_dwells(rng: 
     assert seen.keys is not None
     assert seen.keys["columns"] == {"time": "time_s", "x": "ax", "y": "ay", "z": "az", "supply": "supply_V"}
     assert "rows" not in seen.keys
+    columns["unit"] = np.where(hand.time < 30.0, "S1", "S2")
+    assert recognise([csv(tmp_path / "b.csv", columns)]).open[0].startswith("samples of 2 units, one is needed")
 
 
 def test_means_of_counts_close_to_gravity_in_mg_are_asked_about(rng: Rng, tmp_path: Path) -> None:
