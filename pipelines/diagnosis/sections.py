@@ -48,6 +48,12 @@ def faults(document: DiagnosisDocument) -> Section:
     return Section(title, ("fault", "unit", ("dwells", ""), "evidence"), rows, [])
 
 
+def fault_lines(document: DiagnosisDocument) -> list[str]:
+    """The data faults, each in a line."""
+    rows = faults(document).rows
+    return [f"data fault of {unit} (not judged): {name}, dwells {at}: {text}" for name, unit, at, text in rows]
+
+
 def _numbers(dwells: list[int]) -> str:
     if len(dwells) > 4:
         return f"{len(dwells)}, from {dwells[0]} on"

@@ -25,13 +25,9 @@ UNEXPLAINED = "Significant, but of unknown cause"
 def verdict(document: DiagnosisDocument) -> str:
     """The verdict in one sentence with its numbers."""
     error, faulty = document["error"], {u for f in document["blocked_by"] for u in f["units"]}
-    if error["rms_ug"] is None:
-        return (
-            f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; correct the faults, then judge the model."
-        )
     judged = {"adequate": document["adequate"], "reason": document.get("reason"), **error}
     judged["units"] = len(document["units"]) - len(faulty)
-    text, figures = plain_verdict(judged), _figures(judged)
+    text = plain_verdict(judged)
     if document["adequate"] is not False:
         return f"{text}."
     spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
@@ -42,7 +38,7 @@ def verdict(document: DiagnosisDocument) -> str:
         passes = not named and not document["unexplained"] and (error["p_value"] or 0.0) >= ADEQUATE_ABOVE
         unknown = single is not None and single["adequate_without"] is None
         found = "is adequate" if passes else "is not adequate either"
-        without = f"the model {'cannot be judged' if passes and unknown else found}: {figures}"
+        without = f"the model {'cannot be judged' if passes and unknown else found}: {_figures(judged)}"
         return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
     if named:
         return f"{text}; missing: {', and '.join(named)}."
@@ -127,9 +123,8 @@ def undetected(document: DiagnosisDocument) -> str:
     if smallest is None and "third_order" in document.get("effects", ()):
         return "few dwells" if few_dwells(document) else ""  # the model has a cubic term: none is missing
     few = "few dwells: " if few_dwells(document) else ""
-    if smallest is None:
-        return f"{few}a cubic term of any size is not detected"
-    return f"{few}a cubic term is detected from {short(smallest)} µg/g³ on, with a probability of one half"
+    size = f"is detected from {short(smallest)} µg/g³ on, with a probability of one half"
+    return f"{few}a cubic term {'of any size is not detected' if smallest is None else size}"
 
 
 def influences(document: DiagnosisDocument, most: int | None = NAMED_DWELLS) -> list[str]:

@@ -215,7 +215,7 @@ def _reads_as_time(column: pd.Series) -> bool:
 
 _REFERENCE = re.compile(r"^(?:force|ref|true|applied)\w*$|^g(?:_in)?$", re.IGNORECASE)
 _TILT = re.compile(r"angle|tilt|incl|theta|^deg|winkel|neigung", re.IGNORECASE)
-_SINGLE_OUT = re.compile(r"^(?:out|volt|output|acc|signal|reading|lsb|counts?|u)\w*$|^v$", re.IGNORECASE)
+_SINGLE_OUT = re.compile(r"(?i)^((out|volt|acc|signal|read|lsb|count|u(?!nit))\w*|v|a?[xyz](_(m?[gv]|lsb))?)$")
 _FOLLOWS = 0.99
 """Correlation of an output with its reference from which a table is that of one axis."""
 

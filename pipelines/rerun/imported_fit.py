@@ -7,6 +7,7 @@ import pandas as pd
 from pipelines.archive import Run
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.imported_norms import fitted
+from pipelines.diagnosis.sections import fault_lines
 from pipelines.diagnosis.sentences import evidence_text, verdict
 from pipelines.importers.plane import plane_answer
 from pipelines.rerun.documents import ImportedFitDocument
@@ -25,8 +26,7 @@ def fit_document(done: Run, source: str) -> ImportedFitDocument:
         judged = _known_poses(dwells, past, effects)
     else:
         known = gravity_of_import(done.about), str(dwells["out_unit"].iloc[0])
-        across = AXES.index(plane) if plane else 0
-        answer = plane_answer(dwells, across, *known) if plane else fitted(dwells, past, effects, *known)
+        answer = plane_answer(dwells, AXES.index(plane), *known) if plane else fitted(dwells, past, effects, *known)
         judged = {"evidence": None, "leave_out": None, "missing": [], **answer.document, "lines": list(answer.lines)}
     grades = rows_of(done.table("grades")) if "grades" in done.tables() and not plane else []
     units = [{key: row[key] for key in ("unit", "outcome", "grade", "reasons")} for row in grades]
@@ -47,8 +47,5 @@ def _known_poses(dwells: pd.DataFrame, past: pd.DataFrame | None, effects: list[
     document = diagnose(dwells, past, effects)
     document["units"] = list(dict.fromkeys(dwells["unit"].astype(str)))
     missing = [group["effects"] for group in document["classes"] if group["scope"] != "data"]
-    return {
-        **document,
-        "missing": missing,
-        "lines": [verdict(document), *filter(None, [evidence_text(document), lacking(dwells)])],
-    }
+    lines = [verdict(document), *fault_lines(document), evidence_text(document), lacking(dwells)]
+    return {**document, "missing": missing, "lines": [*filter(None, lines)]}

@@ -187,11 +187,9 @@ def _missing(document: ImproveDocument) -> None:
         others = ", ".join(choice["not_separated_from"])
         class_note = f" (these data do not separate it from {others})" if others else ""
         say(f"  missing: {choice['effect']}{class_note}; {'added' if choice['added'] else 'not added'}", style="yellow")
-    for fault in document["diagnosis"]["blocked_by"]:
-        dwells = ", ".join(map(str, fault["dwells"])) or "all"
-        say(f"  data fault {fault['fault']}, dwells {dwells}: {fault['evidence']}", style="bold red")
-    unexplained = document["diagnosis"]["unexplained"]
-    if unexplained:
+    for text in sections.fault_lines(document["diagnosis"]):
+        say(f"  {text}", style="bold red")
+    if document["diagnosis"]["unexplained"]:
         say(f"  {sentences.UNEXPLAINED}: {sentences.unexplained_text(document['diagnosis'])}", style="yellow")
     for text in sentences.left_out(document["diagnosis"]):
         say(f"  {text}", style="yellow")

@@ -8,6 +8,7 @@ from long_suites import mostly_slow
 
 from inertial.data_errors.faults.quantised import lattice_step
 from pipelines.diagnosis.diagnose import diagnose, examination
+from pipelines.diagnosis.sections import fault_lines
 
 pytestmark = pytest.mark.usefixtures("no_next_measurement")
 
@@ -93,8 +94,8 @@ def lacking(table, unit, dwells):
 
 def test_swapped_units_and_a_truncated_file_are_known(rng):
     table = lots.lot(rng)
-    cut = diagnose(lacking(table, "U002", slice(50, None)))["blocked_by"]
-    assert [(b["fault"], b["units"]) for b in cut] == [("truncated_file", ["U002"])]
+    (line,) = fault_lines(diagnose(lacking(table, "U002", slice(50, None))))
+    assert line.startswith("data fault of U002 (not judged): truncated_file, dwells ")
     one, other = (table.index[table["unit"] == u].to_numpy()[40:] for u in ("U001", "U003"))
     table.loc[[*one, *other], OUT] = table.loc[[*other, *one], OUT].to_numpy()
     faults = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}

@@ -61,9 +61,11 @@ def test_two_positions_give_half_the_sum_and_half_the_difference(tmp_path):
 
 def test_a_tumble_is_its_fourier_series(tmp_path):
     path, table = tilt_file(tmp_path)
-    table.rename(columns={"volts": "U [V]", "angle_deg": "Winkel [°]"}).to_csv(tmp_path / "headed.csv", index=False)
-    improved = text_of("improve", tmp_path / "headed.csv", "--yes", "--archive", tmp_path / "improved", status=1)
-    assert "x: U [V] (the one output, which follows its reference); in V" in improved
+    for name in ("U [V]", "x_V"):
+        headed = table.rename(columns={"volts": name, "angle_deg": "Winkel [°]"}).assign(unit_C=25.0)
+        headed.to_csv(tmp_path / "headed.csv", index=False)
+        improved = text_of("improve", tmp_path / "headed.csv", "--yes", "--archive", tmp_path / "improved", status=1)
+        assert f"x: {name} (the one output, which follows its reference); in V" in improved
     run, archive = imported(tmp_path, path, "--map", TILT), tmp_path / "archive"
     plain = document_of("fit", run, "--archive", archive)
     assert plain["adequate"] is False

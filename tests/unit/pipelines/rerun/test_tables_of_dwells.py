@@ -106,6 +106,7 @@ def test_a_bad_dwell_of_one_unit_is_left_out_of_it_alone(tmp_path: Path) -> None
     """As a diagnosis advises: the other units keep theirs, and their coefficients."""
     dwells = table(np.random.default_rng(5))
     dwells.loc[(dwells["unit"] == "B") & (dwells["dwell"] == 7), "out_y"] += 0.004
+    dwells.loc[dwells["unit"] == "C", "out_x"] *= -1.0
     path = tmp_path / "lot.csv"
     dwells.to_csv(path, index=False)
     done = import_document([path], {"device": "MY-1"}, "", "", str(tmp_path / "archive"), None, nullcontext)
@@ -121,7 +122,9 @@ def test_a_bad_dwell_of_one_unit_is_left_out_of_it_alone(tmp_path: Path) -> None
     kept = archive.run(without.new)
     assert set(kept.about["left_out"]) == {"B:7"}
     assert set(kept.table("dwells").query("dwell == 7")["unit"]) == {"A", "C"}
-    assert "B lacks 7; units are fitted" in "".join(fit_document(kept, whole.new)["lines"])
+    lines = "\n".join(fit_document(kept, whole.new)["lines"])
+    assert "B lacks 7; units are fitted" in lines
+    assert "\ndata fault of C (not judged): axis_flip, dwells all: x reads −x" in lines
 
 
 def test_units_of_a_lot_with_gaps_are_fitted_on_what_they_have() -> None:
