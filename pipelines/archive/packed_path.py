@@ -8,8 +8,6 @@ The functions of :mod:`os` stand here where the methods of a path would ask the 
 """
 # ruff: noqa: PTH100, PTH110, PTH114, PTH115, PTH116, PTH120, PTH123, PTH208
 
-from __future__ import annotations
-
 import io
 import os
 from collections.abc import Generator

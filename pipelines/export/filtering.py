@@ -1,7 +1,5 @@
 """A low-pass filter behind a correction: chosen from the measured bandwidth, run by sample, its state stored between files."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from itertools import pairwise

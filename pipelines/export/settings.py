@@ -1,7 +1,5 @@
 """What an export states that a run does not contain: conventions of the receiver, and what its firmware does besides."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Inspection of a file: its content, its probable meaning, its faults, and the command that imports it."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence

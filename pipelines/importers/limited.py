@@ -4,8 +4,6 @@ A file decides what its parser does. One that never returns, or takes more memor
 and is refused in a sentence. The process is started at the first file, reused for the next, and ends with its parent process.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import signal

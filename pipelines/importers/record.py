@@ -1,7 +1,5 @@
 """Foreign columns turned into a raw record and its dwells; contradictions to the mapping are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

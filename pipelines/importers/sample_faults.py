@@ -1,7 +1,5 @@
 """Samples that an axis repeats, and torn words: refused, left out or used, by the mapping."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

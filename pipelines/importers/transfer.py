@@ -1,7 +1,5 @@
 """A transfer function of another system: points from a CSV, judged as those of a sweep."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path

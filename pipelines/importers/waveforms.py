@@ -1,7 +1,5 @@
 """Import of dynamic tests: waveforms of unit and reference, reduced and judged in the same way as those of a station."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

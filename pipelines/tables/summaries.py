@@ -1,7 +1,5 @@
 """One pass over the samples of a run: a row for every unit and record, the input of validation and reduction."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
