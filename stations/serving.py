@@ -189,7 +189,6 @@ def _values(links: Links, device: Served) -> Iterator[RegisterReading]:
 
 
 def _shown(registers: Registers, register: Register) -> str:
-    """The present value of a register, as text."""
     value = registers.read(register.name)
     if isinstance(value, list):
         return ", ".join(f"{number:.6g}" for number in value)

@@ -215,7 +215,6 @@ def _stored(
     archive: str | Path | None,
     units: Mapping[str, str] | None,
 ) -> Recording:
-    """A table of dwells as a run."""
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
     dwells, told = complete_table(dwells, (units or {}).get("output", ""))

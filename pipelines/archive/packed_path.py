@@ -155,7 +155,6 @@ class PackedPath(Base):
         return packed if isinstance(packed, packs.Member) else None
 
     def _packed_names(self) -> set[str]:
-        """Names of what is packed directly below."""
         name = self._below_root()
         if not name or not self.known.contents():
             return set()

@@ -205,7 +205,6 @@ class Run:
         return data
 
     def _put(self, name: str, data: bytes) -> None:
-        """Publish a file of the run."""
         files.publish(self.path / name, data)
 
     def _hash_of(self, name: str) -> str:

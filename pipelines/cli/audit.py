@@ -126,7 +126,6 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], root: str, page: P
 
 
 def _certificates(audited: Audit) -> str:
-    """The state of the ledger in one line."""
     from inertial.counts import number_of
 
     if not len(audited.certificates):

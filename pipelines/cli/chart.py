@@ -107,7 +107,6 @@ def _drawn(
 
 
 def _joined(dots: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """The dots with straight lines between them."""
     joined = list(dots[:1])
     for (x, y), (u, v) in itertools.pairwise(dots):
         steps = max(abs(u - x), abs(v - y))

@@ -177,7 +177,6 @@ def write_state(path: Path, state: Kept) -> None:
 
 
 def _plain(content: dict[str, Any]) -> dict[str, Any]:
-    """Values for JSON: arrays as lists."""
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in content.items()}
 
 

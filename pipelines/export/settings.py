@@ -97,7 +97,6 @@ class ExportSettings:
     data_sheet: DataSheet | None = None
 
     def __post_init__(self) -> None:
-        """Refuses settings outside their range."""
         if self.arithmetic not in ARITHMETICS:
             raise WrongUse(
                 f"--set arithmetic: found '{shown(self.arithmetic)}'; {did_you_mean(self.arithmetic, ARITHMETICS)}"

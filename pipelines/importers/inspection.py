@@ -132,7 +132,6 @@ def _of_points(path: Path, seen: Recognition, meanings: Mapping[str, str]) -> In
 
 
 def _content_of_dwells(table: pd.DataFrame) -> str:
-    """The content of the table as a sentence."""
     names = set(table.columns)
     if set(FORCE_COLUMNS) <= names:
         reference = "the force on each axis"

@@ -58,8 +58,6 @@ def limits_for(size: int) -> ReadingLimits:
 
 
 class _Reader:
-    """The process that reads."""
-
     def __init__(self) -> None:
         # -P and the path of this process: a module in the folder of the recordings is never imported
         environment = os.environ | ENVIRONMENT | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

@@ -217,7 +217,6 @@ def _as_dwells(
     where: str,
     remarks: tuple[str, ...],
 ) -> Imported:
-    """A file whose rows are dwells."""
     count = pd.Series(serials).groupby(serials).cumcount().to_numpy()
     time = count.astype(np.float64)
     if "time" in columns:

@@ -27,7 +27,6 @@ class SampleFaults:
     bad: Flags
 
     def __bool__(self) -> bool:
-        """Whether there are faults."""
         return bool(self.frozen or self.torn)
 
     def sentences(self, time: Array) -> list[str]:

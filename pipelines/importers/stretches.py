@@ -55,7 +55,6 @@ class Stretches:
     remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
-        """Their number."""
         return len(self.spans)
 
     def only(self, numbers: Sequence[int]) -> Stretches:

@@ -112,7 +112,6 @@ def _as_radians(points: Points) -> Points:
 
 
 def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[str, pd.DataFrame]:
-    """Points and findings for the archive."""
     size, c = np.abs(points.value), points.conditions
     rows = pd.DataFrame(
         {

@@ -96,7 +96,6 @@ class Triad:
     doubt: str = ""
 
     def __bool__(self) -> bool:
-        """Whether there are three columns."""
         return bool(self.names)
 
 

@@ -215,7 +215,6 @@ class _Recording(NamedTuple):
 
 
 def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWaveforms) -> _Recording:
-    """The channels of one file."""
     first, _, second = (piece.strip() for piece in layout.group.partition(","))
     content, source = files.read_content(path, first)
     other = files.read_content(path, second)[0] if second else content

@@ -179,7 +179,6 @@ def _verified(
 
 
 def _captures(archive: Archive, runs: Sequence[Run]) -> list[Place]:
-    """Folders of the captures that runs were made from."""
     named = dict.fromkeys(str(run.about.get("capture") or "") for run in runs)
     return [archive.root / "captures" / name for name in named if name and (archive.root / "captures" / name).is_dir()]
 
@@ -199,7 +198,6 @@ def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: Verifie
 
 
 def _below(folder: Place) -> list[Place]:
-    """Folders in a folder, by name."""
     if not folder.is_dir():
         return []
     return sorted((path for path in folder.iterdir() if path.is_dir()), key=lambda path: path.name)
@@ -221,7 +219,6 @@ def _report_untrusted(total: VerifiedPart, *, demanded: bool) -> None:
 
 
 def _trust(total: VerifiedPart) -> str:
-    """Sentence about the signatures."""
     count, signatures = total.manifests, total.signatures
     if signatures[UNSIGNED] == count:
         return "UNSIGNED: nothing shows who wrote this archive; make a key with 'tumbleline archive key'"

@@ -227,7 +227,6 @@ def _about(driver: DriverValues) -> Array:
 
 
 def _product(driver: DriverValues, other: DriverValues) -> str:
-    """The label of the product of two quantities."""
     parts = [(part.label.partition(" / ")[0], part.label.partition(" / ")[2], part.name) for part in (driver, other)]
     names = [name if name in FORCES else f"({label} less its mean)" for label, _, name in parts]
     if parts[0] == parts[1]:
@@ -295,7 +294,6 @@ def effect_chart(view: EffectView, pick: Callable[[int, int], str] | None = None
 
 
 def _fan(view: EffectView) -> list[Trace]:
-    """The curves of the other units."""
     lines = [view.line(k) for k in range(len(view.units)) if k != view.shown][:FAN]
     return [
         Trace("the same, other units", *line, "line", "muted", width=1.0, legend=not k) for k, line in enumerate(lines)

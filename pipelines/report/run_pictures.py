@@ -122,7 +122,6 @@ def _residuals(title: str, residuals: pd.DataFrame, against: tuple[str, str], si
 
 
 def _told(rows: pd.DataFrame) -> tuple[str, ...]:
-    """Residuals as texts."""
     columns = (rows[name] for name in ("axis", "pose", "dwell", "residual_ug"))
     return tuple(
         f"{axis}, pose {pose}, dwell {int(dwell)}: {left:.4g} µg"

@@ -195,7 +195,6 @@ def _model_text(model: dict[str, Any], other: dict[str, Any]) -> str:
 
 
 def _changed_figures(before: dict[str, Any], after: dict[str, Any]) -> str:
-    """The figures whose limits differ."""
     a, b = before.get("figures", {}), after.get("figures", {})
     return ", ".join(name for name in {**a, **b} if a.get(name) != b.get(name))
 

@@ -230,7 +230,6 @@ def _coefficients(evidence: GradeEvidence, zero_g: float) -> tuple[LotCoefficien
 
 
 def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
-    """Rows that all have the same columns as a table."""
     return pd.DataFrame({name: [row[name] for row in rows] for name in (rows[0] if rows else ())})
 
 

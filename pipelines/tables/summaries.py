@@ -63,7 +63,6 @@ def unit_means(table: pd.DataFrame) -> dict[str, Array]:
 def _of_record(
     record: int, tables: Iterator[pd.DataFrame], full: pd.Series, zero_output: float, letters: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
-    """The rows of one record, from all of its tables."""
     known: dict[str, dict[str, Any]] = {}
     for table in tables:
         for unit, part in _parts(table, record, full, zero_output, letters):
