@@ -1,7 +1,5 @@
 """Checks of a whole archive, or of some of its runs with their captures, read side by side."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -84,7 +82,7 @@ def verify(
     archive: Archive,
     runs: Sequence[str] = (),
     *,
-    keys: Mapping[str, Ed25519PublicKey],
+    keys: "Mapping[str, Ed25519PublicKey]",
     demanded: bool = False,
     head: str = "",
     also: Sequence[Callable[[Archive, VerifiedPart], None]] = (),
@@ -129,7 +127,7 @@ def _chosen(archive: Archive, runs: Sequence[str]) -> list[Run]:
 def _verified(
     archive: Archive,
     runs: Sequence[str],
-    keys: Mapping[str, Ed25519PublicKey],
+    keys: "Mapping[str, Ed25519PublicKey]",
     *,
     demanded: bool,
     head: str,
