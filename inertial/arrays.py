@@ -1,7 +1,5 @@
 """Types of arrays by what their elements are, where flags stand in a row, and σ by medians."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

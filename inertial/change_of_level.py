@@ -32,7 +32,6 @@ class Levels:
     explained: float
 
     def __len__(self) -> int:
-        """How many there are."""
         return int(self.start.size)
 
 

@@ -63,7 +63,10 @@ def disturbances(record: Array) -> list[Disturbance]:
     far = np.abs(quick) > FAR * spread if spread > 0.0 else np.zeros(record.size, dtype=bool)  # 0: coarse digits
     rest = np.where(far, 0.0, quick)
     found = [Disturbance("stuck", run.start, run.stop, run.count, 0.0) for run in frozen(record[:, None])]
-    found += _louder(_bursts(far) | _loud(rest), quick)
+    found += [
+        Disturbance("loud", int(a), int(b), int(b - a), float(np.std(quick[a:b])))
+        for a, b in zip(*runs_of(_bursts(far) | _loud(rest)), strict=True)
+    ]
     within: Flags = np.zeros(record.size, dtype=bool)
     for disturbance in found:
         within[max(disturbance.start - BESIDE, 0) : disturbance.stop + BESIDE] = True
@@ -97,14 +100,6 @@ def disturbance_texts(found: Sequence[Disturbance], rate_hz: float, unit: str) -
             }[kind]
         )
     return texts
-
-
-def _louder(loud: Flags, quick: Array) -> list[Disturbance]:
-    """The louder stretches (n,) of a record's quick part."""
-    return [
-        Disturbance("loud", int(a), int(b), int(b - a), float(np.std(quick[a:b])))
-        for a, b in zip(*runs_of(loud), strict=True)
-    ]
 
 
 def _bursts(far: Flags) -> Flags:

@@ -32,7 +32,6 @@ class StaticIntervals:
     """A window above this standard deviation moves."""
 
     def __len__(self) -> int:
-        """How many intervals there are."""
         return int(self.start.size)
 
 

@@ -1,7 +1,5 @@
 """``python -m pipelines`` and ``tumbleline``: the command line, or one line where a library that it starts with is missing."""
 
-from __future__ import annotations
-
 import os
 import sys
 

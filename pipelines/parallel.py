@@ -4,8 +4,6 @@ The results come back in the order of the partitions, whichever process works on
 BLAS thread: where the work is done changes no byte of the results.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor

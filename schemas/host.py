@@ -4,8 +4,6 @@ Linux and macOS have all of it. Windows has locks on files, none on folders and 
 diagnose, report, workbench) works there without them.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 import sys

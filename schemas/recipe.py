@@ -243,7 +243,6 @@ class Recipe(_Measurement):
 
     @property
     def _dwells(self) -> int:
-        """The number of dwells of all soaks."""
         return sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in range(len(self.temperatures_C)))
 
     @model_validator(mode="after")

@@ -1,7 +1,5 @@
 """The check of a table against its contract: the table with the right types, or a message with row, value and requirement."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -87,7 +85,7 @@ def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
         )
 
 
-def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:
+def _explain(problem: "SchemaError", frame: pd.DataFrame, source: str) -> str:
     column = getattr(problem.schema, "name", None) or "?"
     cases = problem.failure_cases
     if isinstance(cases, pd.DataFrame) and len(cases) and "index" in cases and pd.notna(cases["index"].iloc[0]):

@@ -3,8 +3,6 @@
 Every table has a schema version that travels with its file.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -39,7 +37,7 @@ class Column:
     filled: bool = False
     missing: bool = False
 
-    def contract(self) -> pa.Column:
+    def contract(self) -> "pa.Column":
         """The column in the form of the library that explains violations."""
         import pandera.pandas as pa  # noqa: PLC0415 - a table without an error does not need it
 
@@ -73,7 +71,7 @@ class Table:
         return (*needed, *self.measured)
 
     @cached_property
-    def schema(self) -> pa.DataFrameSchema:
+    def schema(self) -> "pa.DataFrameSchema":
         """The contract for the library that explains what is wrong."""
         import pandera.pandas as pa  # noqa: PLC0415 - a table without an error does not need it
 

@@ -83,7 +83,8 @@ def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> Re
         key=lambda d: (d["type"] != "extra_forbidden", d["type"] == "string_type" and isinstance(d["input"], list)),
     )
     first = details[0]
-    location = [part for part in first["loc"] if not _is_branch(part)]
+    # branches of a union are left out, which the file's author never wrote
+    location = [part for part in first["loc"] if not (isinstance(part, str) and (part == "str" or "[" in part))]
     key = shown(".".join(map(str, location)))
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, first["loc"][:-1])
@@ -98,11 +99,6 @@ def _named(location: Sequence[int | str]) -> str:
     names = ".".join(part for part in location if isinstance(part, str))
     numbers = ".".join(str(part + 1) for part in location if isinstance(part, int))
     return f"'{shown(names)}'{f', number {numbers}' if numbers else ''}" if location else ""
-
-
-def _is_branch(part: object) -> bool:
-    """Whether a part of a location is a branch of a union, which the file's author never wrote."""
-    return isinstance(part, str) and (part == "str" or "[" in part)
 
 
 def _sentence(detail: ErrorDetails, key: str) -> str:

@@ -4,8 +4,6 @@ A change of the columns of a table raises :data:`VERSION` by one and adds a line
 version before. ``tests/archives`` keeps an archive of every version.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -15,7 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 VERSION = 1
-UPGRADES: dict[tuple[str, int], Callable[[pd.DataFrame], pd.DataFrame]] = {}
+UPGRADES: "dict[tuple[str, int], Callable[[pd.DataFrame], pd.DataFrame]]" = {}
 """By table and version: the conversion to the next version."""
 
 
@@ -27,7 +25,7 @@ def refuse_newer(version: object, where: str) -> None:
         )
 
 
-def upgraded(name: str, frame: pd.DataFrame, version: int, where: str) -> pd.DataFrame:
+def upgraded(name: str, frame: "pd.DataFrame", version: int, where: str) -> "pd.DataFrame":
     """The table, of an older schema version, in that of this version; its file stays unchanged."""
     refuse_newer(version, where)
     for step in range(version, VERSION):

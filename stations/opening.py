@@ -1,7 +1,5 @@
 """Opening a station from its links, profiles and adapters; the only module that distinguishes simulation from hardware."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import tempfile
@@ -103,7 +101,7 @@ def open_devices(
 
 def make_plant(
     config: StationConfig, lot: Lot, resume: bytes | None = None, hidden: Sequence[HiddenEffect] = ()
-) -> Plant:
+) -> "Plant":
     """The plant of a simulated station, in the state ``resume`` if one is given."""
     from stations.plant.plant import Plant  # noqa: PLC0415 - hardware needs no plant
 
@@ -114,7 +112,7 @@ def make_plant(
 
 
 @contextmanager
-def serve_plant(config: StationConfig, lot: Lot, plant: Plant, roles: Sequence[str] = ()) -> Generator[Station]:
+def serve_plant(config: StationConfig, lot: Lot, plant: "Plant", roles: Sequence[str] = ()) -> Generator[Station]:
     """A station whose devices are those of a plant, served on loopback; ``lot``: the units that the client expects."""
     from stations.plant.plant import PlantClock  # noqa: PLC0415 - hardware needs no plant
 
@@ -124,7 +122,7 @@ def serve_plant(config: StationConfig, lot: Lot, plant: Plant, roles: Sequence[s
 
 
 @contextmanager
-def serve_devices(config: StationConfig, plant: Plant, roles: Sequence[str] = ()) -> Generator[Links]:
+def serve_devices(config: StationConfig, plant: "Plant", roles: Sequence[str] = ()) -> Generator[Links]:
     """The links to a plant's devices, served on loopback: registers over Modbus TCP, lines beside it."""
     from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415
     from stations.plant.server import LOOPBACK, PlantServer, serve_lines  # noqa: PLC0415

@@ -1,7 +1,5 @@
 """Serves a simulated station in wall time to any Modbus client, and reads every register of a station."""
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, suppress
@@ -77,7 +75,7 @@ def serve(
     port: int,
     speed: float,
     stop: Event,
-    ready: Callable[[str, int], Callable[[Plant], None] | None],
+    ready: "Callable[[str, int], Callable[[Plant], None] | None]",
     silence_s: float = 0.0,
 ) -> None:
     """Serves until ``stop`` is set; the time of the station advances at ``speed`` times wall time.
@@ -108,7 +106,7 @@ def serve(
             done = now
 
 
-def _listening(plant: Plant, host: str, port: int, stack: ExitStack) -> PlantServer:
+def _listening(plant: "Plant", host: str, port: int, stack: ExitStack) -> "PlantServer":
     """The servers of all devices, left to ``stack``; with port 0 another port is tried when a program has just taken one."""
     from stations.plant.server import PlantServer, serve_lines  # noqa: PLC0415
 
@@ -189,7 +187,6 @@ def _values(links: Links, device: Served) -> Iterator[RegisterReading]:
 
 
 def _shown(registers: Registers, register: Register) -> str:
-    """The present value of a register, as text."""
     value = registers.read(register.name)
     if isinstance(value, list):
         return ", ".join(f"{number:.6g}" for number in value)
@@ -201,7 +198,7 @@ def _shown(registers: Registers, register: Register) -> str:
 class IdleStop:
     """Stops devices without a request for ``seconds``; the time counts from the first request to a device."""
 
-    def __init__(self, plant: Plant, devices: Devices, seconds: float) -> None:
+    def __init__(self, plant: "Plant", devices: Devices, seconds: float) -> None:
         self._plant, self._seconds = plant, seconds
         self._stops: dict[int, Callable[[], None]] = {
             devices.outer.device_id: lambda: plant.outer.halt(plant.now),

@@ -1,7 +1,5 @@
 """Whether a model is adequate, where it fails, and which physical effect is missing."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,7 +26,7 @@ class JudgedModel:
     document : with the keys of ``--json`` of the command of the same name
     """
 
-    document: DiagnosisDocument | ImproveDocument = field(repr=False)
+    document: "DiagnosisDocument | ImproveDocument" = field(repr=False)
 
     @property
     def adequate(self) -> bool | None:
@@ -45,9 +43,9 @@ class JudgedModel:
 class ModelDiagnosis(JudgedModel):
     """The diagnosis of a model."""
 
-    document: DiagnosisDocument = field(repr=False)
+    document: "DiagnosisDocument" = field(repr=False)
     source: str = ""
-    _made: Examination | None = field(default=None, repr=False)
+    _made: "Examination | None" = field(default=None, repr=False)
 
     @property
     def verdict(self) -> str:

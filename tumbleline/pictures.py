@@ -1,7 +1,5 @@
 """Pictures and tables as a notebook shows them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -20,7 +18,7 @@ MOST_ROWS = 40  # rows of a table that is shown; the table itself has all
 class Picture:
     """A chart; a notebook shows it, and :meth:`save` writes it as ``.svg``, ``.png`` or ``.pdf``."""
 
-    chart: Chart
+    chart: "Chart"
 
     def _repr_svg_(self) -> str:
         from pipelines.drawing.vector import alone, svg_text

@@ -1,7 +1,5 @@
 """Recordings of accelerometers: a file of any system, a DataFrame, or a run of an archive, as dwells that can be fitted."""
 
-from __future__ import annotations
-
 import hashlib
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
@@ -215,7 +213,6 @@ def _stored(
     archive: str | Path | None,
     units: Mapping[str, str] | None,
 ) -> Recording:
-    """A table of dwells as a run."""
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
     dwells, told = complete_table(dwells, (units or {}).get("output", ""))
@@ -270,7 +267,7 @@ def _imported(
     return Recording(run, _told(seen, proposal, done["remarks"], stated), Proposal(keys).command(paths))
 
 
-def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str]:
+def _open(keys: dict[str, Any], seen: "Recognition", *, decided: bool) -> list[str]:
     """Keys and columns that are neither stated nor recognised; empty where the mapping is complete."""
     blanks = {"COLUMN", "UNIT", "HZ"}
     left = [f"column {m}" for m, name in keys["columns"].items() if name in blanks]
@@ -279,7 +276,7 @@ def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str
     return left or ([] if decided or not seen.open or keys["columns"] else list(seen.open))
 
 
-def _told(seen: Recognition, proposal: Proposal | None, remarks: Sequence[str], stated: Any) -> tuple[str, ...]:
+def _told(seen: "Recognition", proposal: "Proposal | None", remarks: Sequence[str], stated: Any) -> tuple[str, ...]:
     cures = ["(--rate " if key == "rate_hz" else f"(--set {key}=" for key in stated]  # end an assumption of a key
     assumed = () if proposal is None else (line for line in proposal.assumed if not any(cure in line for cure in cures))
     guessed = seen.guessed

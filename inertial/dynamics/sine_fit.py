@@ -33,38 +33,34 @@ class Tone:
     frequency_error: float = 0.0
 
 
-def fit_tone(record: Array, rate_hz: float, frequency: float, *, first_s: float = 0.0, harmonics: int = 1) -> Tone:
+def fit_tone(record: Array, rate_hz: float, frequency: float, *, harmonics: int = 1) -> Tone:
     """The tone of a known frequency in every channel, by least squares with constant and drift.
 
     Parameters
     ----------
     record : (n, channels), any unit
     rate_hz, frequency : Hz
-    first_s : time of the first sample, s
     harmonics : highest one that is fitted beside the tone, below half the rate; distortion of an exciter is no noise of a sample
     """
     n = len(record)
     if n < 8:
         raise NotIdentified(f"sine fit: {n} samples, 8 or more are needed; record longer")
-    time = first_s + np.arange(n) / rate_hz
+    time = np.arange(n) / rate_hz
     design = np.hstack([_columns(time, frequency), *_harmonics(time, rate_hz, frequency, harmonics)])
     c, left = _projected(design, record)
     sigma = np.sqrt(np.sum(left**2, axis=0) / (n - design.shape[1]))
     return Tone(c[0] - 1j * c[1], sigma, sigma * np.sqrt(2.0 / n), frequency)
 
 
-def fit_tone_and_frequency(
-    record: Array, rate_hz: float, frequency: float, *, first_s: float = 0.0, harmonics: int = 1
-) -> Tone:
+def fit_tone_and_frequency(record: Array, rate_hz: float, frequency: float, *, harmonics: int = 1) -> Tone:
     """The tone and its frequency, common to all channels: Gauss–Newton on the fourth parameter.
 
     A device with a clock of its own sees another frequency; 1000 ppm at 1 kHz over 1 s would null a fit at the given one. The
     search begins at the largest value of a fine periodogram within ± 2 % of the given frequency.
-    The phase refers to time 0, so ``first_s`` decides how strongly phase and frequency depend on each other. ``harmonics`` is as
-    for :func:`fit_tone`.
+    The phase refers to the first sample. ``harmonics`` is as for :func:`fit_tone`.
     """
     n = len(record)
-    time = first_s + np.arange(n) / rate_hz
+    time = np.arange(n) / rate_hz
     span = n / rate_hz
     f = _coarse(record, time, frequency, span)
     error = np.inf
@@ -83,7 +79,7 @@ def fit_tone_and_frequency(
         f += float(np.clip(step, -0.25 / span, 0.25 / span))
         if abs(step) < 1e-3 * error:
             break
-    tone = fit_tone(record, rate_hz, f, first_s=first_s, harmonics=harmonics)
+    tone = fit_tone(record, rate_hz, f, harmonics=harmonics)
     return Tone(tone.value, tone.sigma, tone.amplitude_error, f, error)
 
 

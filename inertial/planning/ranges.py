@@ -18,7 +18,6 @@ class UnseenRange:
     high: float
 
     def __str__(self) -> str:
-        """The range with its unit."""
         name, unit = self.parameter.replace("_", " "), {"degC": "°C"}.get(self.unit, self.unit)
         low, high = _plain(self.low), _plain(self.high)
         return f"{name} {low} {unit}" if self.low == self.high else f"{name} {low} to {high} {unit}"

@@ -50,7 +50,6 @@ class Cause:
     cure: str
 
     def __str__(self) -> str:
-        """The sentence."""
         return f"{self.feature} {self.consequence}: {self.result}; {self.cure}".strip()
 
 

@@ -86,11 +86,6 @@ def with_soaks(state: State, temperatures: list[float], *, soaked: bool = True) 
     return extended(state, steps, StationPace(soak_s=900.0))
 
 
-def soaks_back(state: State) -> State:
-    """The plan, then its soaks in the opposite order."""
-    return with_soaks(state, levels(state)[-2::-1])
-
-
 def ramps(state: State) -> State:
     """The plan, then dwells during temperature ramps in both directions."""
     last = last_level(state)
@@ -213,7 +208,7 @@ REMEDIES: tuple[Remedy, ...] = (
     Remedy(
         "temperature",
         _where("soaks in one direction only", features.one_way),
-        soaks_back,
+        lambda s: with_soaks(s, levels(s)[-2::-1]),
         lambda s: f"add soaks on the way back, at {_degrees(features.levels(s)[-2::-1])} °C",
     ),
     Remedy(

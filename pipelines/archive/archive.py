@@ -5,8 +5,6 @@ its manifest ``<table>.json``. The name of a run has the name of its recipe and 
 that the same command finds the same run.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import sys
@@ -154,7 +152,7 @@ class Archive:
             message = f"{where}: there is no run yet; make one with 'tumbleline run'"
         raise WrongUse(message)
 
-    def table(self, run: str, name: str) -> pd.DataFrame:
+    def table(self, run: str, name: str) -> "pd.DataFrame":
         """A table of a run."""
         return self.run(run).table(name)
 

@@ -8,8 +8,6 @@ The functions of :mod:`os` stand here where the methods of a path would ask the 
 """
 # ruff: noqa: PTH100, PTH110, PTH114, PTH115, PTH116, PTH120, PTH123, PTH208
 
-from __future__ import annotations
-
 import io
 import os
 from collections.abc import Generator
@@ -157,7 +155,6 @@ class PackedPath(Base):
         return packed if isinstance(packed, packs.Member) else None
 
     def _packed_names(self) -> set[str]:
-        """Names of what is packed directly below."""
         name = self._below_root()
         if not name or not self.known.contents():
             return set()

@@ -207,7 +207,6 @@ class Records:
         return sorted((folder for folder in folders if is_number(folder.name)), key=lambda folder: folder.name)
 
     def _last(self) -> Place | None:
-        """Folder of the record stored last; None before the first."""
         folders = self._folders()
         order = {folder: files.read_json(folder / "record.json")["order"] for folder in folders}
         return max(folders, key=lambda folder: order[folder]) if folders else None

@@ -1,7 +1,5 @@
 """One run of the archive: tables with a manifest beside each, the report, and the seal that names them all."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -96,7 +94,7 @@ class Run:
         """Whether all these tables are there, made by the stage with this key."""
         return all(self._is_made_by(name, key) for name in names)
 
-    def save(self, stage: str, key: str, outputs: Mapping[str, pd.DataFrame], about: Mapping[str, Any]) -> None:
+    def save(self, stage: str, key: str, outputs: "Mapping[str, pd.DataFrame]", about: Mapping[str, Any]) -> None:
         """Publish the tables of a stage with a manifest beside each.
 
         about : the stage's inputs, parameters and code, as they went into the key.
@@ -111,7 +109,7 @@ class Run:
             manifest = {**by, **content, **about, "schema": tables.VERSION, "manifests": follows}
             self._put(f"{name}.json", files.manifest_bytes(manifest))
 
-    def adopt(self, other: Run, names: tuple[str, ...]) -> None:
+    def adopt(self, other: "Run", names: tuple[str, ...]) -> None:
         """Copy tables from another run of the same archive, byte for byte, with their provenance."""
         for name in names:
             path, manifest = other.path / f"{name}.parquet", other.manifest(name)
@@ -157,7 +155,7 @@ class Run:
         """Whether the report is there, made with this key."""
         return self.report.is_file() and self._manifest_key("report") == key
 
-    def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
+    def table(self, name: str, columns: Sequence[str] = ()) -> "pd.DataFrame":
         """A table of the run, whole and unchanged since it was written.
 
         columns : those that the caller reads; the table may have more. All where none is named
@@ -198,14 +196,13 @@ class Run:
             hashes["records"] = files.sha256(records.path / COMPLETE)
         return {name: value for name, value in sorted(hashes.items()) if value}
 
-    def _put_table(self, name: str, table: pa.Table) -> bytes:
+    def _put_table(self, name: str, table: "pa.Table") -> bytes:
         """The bytes of a table, which is published."""
         data = encoded(table)
         self._put(f"{name}.parquet", data)
         return data
 
     def _put(self, name: str, data: bytes) -> None:
-        """Publish a file of the run."""
         files.publish(self.path / name, data)
 
     def _hash_of(self, name: str) -> str:

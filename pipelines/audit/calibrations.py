@@ -1,7 +1,5 @@
 """All calibrations of an archive as arrays: unit, station, day and parameters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -41,7 +39,7 @@ class Calibrations:
     def __len__(self) -> int:
         return self.day.size
 
-    def chosen(self, which: Flags | Index) -> Calibrations:
+    def chosen(self, which: Flags | Index) -> "Calibrations":
         """The chosen calibrations, in their order."""
         return Calibrations(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 

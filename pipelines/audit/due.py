@@ -47,7 +47,6 @@ class Certificates:
     problems: Mapping[str, str]
 
     def __len__(self) -> int:
-        """Number of calibrations."""
         return sum(len(calibrations) for calibrations in self.of.values())
 
     def standing(self, device: str, serial: str, run: str) -> CertificateState | None:

@@ -1,7 +1,5 @@
 """Pairs of calibrations of one unit: their times, changes and E_n."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +21,7 @@ class Pairs:
     earlier: Index
     years: Array
 
-    def chosen(self, which: Flags | Index) -> Pairs:
+    def chosen(self, which: Flags | Index) -> "Pairs":
         """The chosen pairs, in their order."""
         return Pairs(self.later[which], self.earlier[which], self.years[which])
 

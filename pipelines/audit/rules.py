@@ -1,7 +1,5 @@
 """The audit's rules: intervals, tolerances, check standards; complete values in the file ``default.toml`` of this package."""
 
-from __future__ import annotations
-
 import tomllib
 from fnmatch import fnmatchcase
 from importlib.resources import files
@@ -66,7 +64,7 @@ class Rules(Strict):
     device: dict[str, DeviceRules] = Field(default_factory=dict[str, DeviceRules])
 
     @model_validator(mode="after")
-    def _ordered(self) -> Rules:
+    def _ordered(self) -> "Rules":
         if self.shortest_months > self.longest_months:
             raise ValueError(
                 f"shortest_months: {self.shortest_months} is above longest_months ({self.longest_months}); exchange them"

@@ -144,7 +144,6 @@ def _in_schema(table: pa.Table, expected: pa.Schema) -> pa.Table:
 
 
 def _line(files: RunFiles, about: Mapping[str, Any], problem: str) -> tuple[str, ...]:
-    """The run's row in the table of runs."""
     recipe, lot, station = (about.get(key) or {} for key in ("recipe", "lot", "station"))
     row = {
         "run": files.run,

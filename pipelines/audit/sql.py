@@ -1,7 +1,5 @@
 """SQL over the archive: DuckDB reads the Parquet files in place; nothing is loaded before, nothing can be written."""
 
-from __future__ import annotations
-
 import mmap
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -72,7 +70,7 @@ def _engine() -> Any:
     return library("duckdb", "sql", "query: SQL over the archive")
 
 
-def _answered(connection: duckdb.DuckDBPyConnection, statement: str) -> QueryResult:
+def _answered(connection: "duckdb.DuckDBPyConnection", statement: str) -> QueryResult:
     try:
         cursor = connection.execute(statement)
         return QueryResult(tuple(str(column[0]) for column in cursor.description or ()), cursor.fetchall())
@@ -103,7 +101,7 @@ def one_reading_statement(sql: str) -> str:
     return text
 
 
-def _one_statement(sql: str, before: str = "") -> duckdb.Statement:
+def _one_statement(sql: str, before: str = "") -> "duckdb.Statement":
     try:
         statements = _engine().extract_statements(sql)
     except _engine().Error as problem:
@@ -123,7 +121,7 @@ def _refuse(statement: str) -> NoReturn:
     )
 
 
-def _explained(problem: duckdb.Error) -> str:
+def _explained(problem: "duckdb.Error") -> str:
     """The message of DuckDB in one sentence, with the existing views where a table is unknown."""
     text = str(problem).splitlines()[0]
     unknown = re.search(r"Table with name (\S+) does not exist", text)

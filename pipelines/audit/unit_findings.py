@@ -169,12 +169,10 @@ def _when(drift: UnitDrift) -> str:
 
 
 def _expanded(drift: UnitDrift) -> float:
-    """Expanded uncertainty of a change."""
     return abs(drift.change / drift.e_n) if drift.e_n else np.inf
 
 
 def _besides(leavings: Sequence[object]) -> str:
-    """The number of further parameters of a unit, as text."""
     more = len(leavings) - 1
     return f", and {more} more parameter{'s' if more > 1 else ''}" if more else ""
 

@@ -1,7 +1,5 @@
 """Whether a run may be certified: refusals of runs that are unsound, overdue, inadequate or without a stated budget."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +31,7 @@ NEEDED_OF_NORMS = ("gravity", "reader")
 """The same for an import of unknown orientations: the norm of gravity does not depend on the poses."""
 
 
-def refuse_unsound(run: Run, keys: Mapping[str, Ed25519PublicKey]) -> None:
+def refuse_unsound(run: Run, keys: "Mapping[str, Ed25519PublicKey]") -> None:
     """Refuse a run that ``tumbleline verify RUN`` finds something wrong with: it would lend its findings a certificate.
 
     Parameters
@@ -94,14 +92,9 @@ def overdue(station: Mapping[str, Any], day: str) -> str:
     return ""
 
 
-def measured_overdue(run: Run) -> str:
-    """What was overdue when a run was measured, as :func:`overdue` says it."""
-    return overdue(run.about.get("station") or {}, _measured(run))
-
-
 def refuse_overdue(run: Run) -> None:
     """Refuse a run whose station had a reference standard that was due before it measured."""
-    if late := measured_overdue(run):
+    if late := overdue(run.about.get("station") or {}, _measured(run)):
         raise WrongUse(f"certify: run {run.id} was measured on {_measured(run)}, {late}")
 
 

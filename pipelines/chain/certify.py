@@ -1,7 +1,5 @@
 """Certifying a run: its units that passed get a validity in the ledger; those that did not are listed with the reason."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -69,7 +67,7 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     months: int = 0,
     reason: str = "",
     supersede: bool = False,
-    keys: Mapping[str, Ed25519PublicKey] | None = None,
+    keys: "Mapping[str, Ed25519PublicKey] | None" = None,
 ) -> Certified:
     """The events that certify units of a run, written to the ledger.
 

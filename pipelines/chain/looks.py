@@ -88,7 +88,7 @@ class LotLooks:
             }
         )
         plain, guarded = (grade(state.evidence, rule, zero_g) for rule in (limits, wide))
-        fails = _failing(guarded["figures"])
+        fails = dict(reversed(list(_failed(guarded["figures"]))))
         figures = _open_figures(plain["figures"], guarded["figures"], limits, state.units)
         passed = set(plain["grades"].query("outcome == 'pass'")["unit"]) - figures.keys()
         ratio = limits.coverage_factor * state.ratios(self.terms.asked, zero_g)
@@ -235,12 +235,8 @@ def _most_often(figures: Mapping[str, frozenset[str]], undecided: Collection[str
     return "".join(f"; {name} open in {count}" for name, count in counts.most_common(1))
 
 
-def _failing(figures: pd.DataFrame) -> dict[str, str]:
-    """Units with a coefficient beyond its limit by more than its uncertainty, and the figure in words."""
-    return dict(reversed(list(_failed(figures))))
-
-
 def _failed(figures: pd.DataFrame) -> Iterator[tuple[str, str]]:
+    """Units with a coefficient beyond its limit by more than its uncertainty, and the figure in words."""
     failed = figures[(figures["outcome"] == "fail") & figures["figure"].isin(list(OF_COEFFICIENTS))]
     for row in failed.to_dict("records"):
         unit = "" if row["unit_text"] == "1" else f" {row['unit_text']}"

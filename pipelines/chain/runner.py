@@ -3,8 +3,6 @@
 That is going on after a crash and running an archive again, by one mechanism.
 """
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -90,7 +88,7 @@ class Runner:
         for name in ORDER:
             yield self.stage(name)
 
-    def full_plan(self) -> Runner | None:
+    def full_plan(self) -> "Runner | None":
         """The full plan, from where the station stands, where a fitted unit or the lot does not fit the family; else None.
 
         A plan that a prior has shortened misses its required errors where that prior is widened for the lot.

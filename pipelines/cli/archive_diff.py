@@ -1,7 +1,5 @@
 """``tumbleline archive diff``: differences between two runs, their size and their causes."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -64,7 +62,7 @@ def _print_flips(document: dict[str, Any]) -> None:
     )
 
 
-def _styled(outcome: str, grade: str) -> Text:
+def _styled(outcome: str, grade: str) -> "Text":
     from rich.text import Text
 
     return Text.assemble((outcome, STYLES.get(outcome, "")), f" {grade}") if outcome else Text(grade or "not graded")

@@ -1,7 +1,5 @@
 """``tumbleline audit``: drift, calibrations due, changes of stations, and the population."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -71,7 +69,7 @@ def command(
     conclude(made, show, as_json=as_json, passed=not audit_findings)
 
 
-def _refuse_nothing(audited: Audit, root: str) -> None:
+def _refuse_nothing(audited: "Audit", root: str) -> None:
     """Refuse an unknown name, and an archive without calibrations before the day."""
     import numpy as np
 
@@ -88,7 +86,7 @@ def _refuse_nothing(audited: Audit, root: str) -> None:
         )
 
 
-def _show(audited: Audit, audit_findings: list[AuditFinding], root: str, page: Path | None, _: object) -> None:
+def _show(audited: "Audit", audit_findings: "list[AuditFinding]", root: str, page: Path | None, _: object) -> None:
     from inertial.counts import number_of
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
@@ -125,8 +123,7 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], root: str, page: P
         remark(f"page    {page}")
 
 
-def _certificates(audited: Audit) -> str:
-    """The state of the ledger in one line."""
+def _certificates(audited: "Audit") -> str:
     from inertial.counts import number_of
 
     if not len(audited.certificates):

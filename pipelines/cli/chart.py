@@ -1,7 +1,5 @@
 """Line charts in a terminal, drawn with braille dots (2 × 4 dots in each character), and points as marks."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -38,7 +36,7 @@ def chart(
     *,
     bounds: tuple[float, float] | None = None,
     label: Callable[[float], str] | None = None,
-) -> Text:
+) -> "Text":
     """The chart as text of ``height`` rows and about ``width`` columns, with values on the left and times below.
 
     span : first and last time of the chart, s
@@ -107,7 +105,6 @@ def _drawn(
 
 
 def _joined(dots: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """The dots with straight lines between them."""
     joined = list(dots[:1])
     for (x, y), (u, v) in itertools.pairwise(dots):
         steps = max(abs(u - x), abs(v - y))

@@ -1,7 +1,5 @@
 """``tumbleline correct``: apply a calibration to a recording, and track the bias where the force is known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -132,7 +130,7 @@ def command(
     conclude(document, partial(_print, remark if printed else say), as_json=as_json, passed=consistent)
 
 
-def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> None:
+def _write(recording: "CorrectableRecording", done: "Corrected", output: Path) -> None:
     from pipelines.archive import files
     from pipelines.export.corrected import table_of
 
@@ -156,7 +154,7 @@ VERDICTS = {
 }
 
 
-def _print(show: Callable[..., None], document: CorrectDocument) -> None:
+def _print(show: Callable[..., None], document: "CorrectDocument") -> None:
     certificate = document["certificate"]
     show(
         f"{document['file']}: {document['samples']} samples corrected with unit {document['unit']} of run {document['run']}"
@@ -179,7 +177,7 @@ def _print(show: Callable[..., None], document: CorrectDocument) -> None:
         show(f"kept for the next recording: {document['state']}")
 
 
-def _print_bias(bias: TrackedBiasDocument, show: Callable[..., None]) -> None:
+def _print_bias(bias: "TrackedBiasDocument", show: Callable[..., None]) -> None:
     """Print the tracked bias, and whether the innovations agree with the stated noise."""
     show(f"force by which the bias is tracked: {'; '.join(bias['force_from'])}")
     show(f"bias at the end, µg: {_axes(bias['last_ug'])}; standard uncertainty: {_axes(bias['u_last_ug'])}")

@@ -33,7 +33,6 @@ def command(
 
 
 def _show(document: DoctorDocument) -> None:
-    """A table of the checks; below it warnings, then faults."""
     from rich.text import Text
 
     checks = document["checks"]

@@ -1,7 +1,5 @@
 """``tumbleline export``: coefficients for firmware, autopilots and spreadsheets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -146,11 +144,11 @@ def command(
 
 def _firmware(
     run: Run,
-    chosen: Sequence[UnitCalibration],
+    chosen: "Sequence[UnitCalibration]",
     form: str,
     low_pass: tuple[str, float | None],
     given: dict[str, Any],
-) -> Firmware:
+) -> "Firmware":
     """The low-pass and the models of the bias that C code gets.
 
     low_pass : as it was given, and rate, Hz · given : settings
@@ -200,7 +198,7 @@ def _write(contents: dict[str, bytes], output: Path | None) -> None:
 
 
 def _print_certificates(
-    run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str], archive: str | None
+    run: Run, chosen: "Sequence[UnitCalibration]", signers: Sequence[str], archive: str | None
 ) -> None:
     """Print the state of the certificates of these coefficients on standard error."""
     from pipelines.certificates.coefficient_remarks import library_remarks

@@ -1,7 +1,5 @@
 """``tumbleline export --waveforms``: the samples of a record of a test procedure in a format of other programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +11,7 @@ if TYPE_CHECKING:
     from pipelines.export.waveforms import Channel
 
 
-def write_record(run: Run, record: int, unit: str, form: str, output: Path | None) -> None:
+def write_record(run: "Run", record: int, unit: str, form: str, output: Path | None) -> None:
     """Write the channels of a unit and of the reference in a record of a run; print the files.
 
     unit : serial number; empty for the first unit of the record
@@ -32,7 +30,7 @@ def write_record(run: Run, record: int, unit: str, form: str, output: Path | Non
         say(f"{path}: {names}")
 
 
-def _one_text(form: str, channels: list[Channel], suffix: str) -> str:
+def _one_text(form: str, channels: "list[Channel]", suffix: str) -> str:
     """The file of a format of text; refused for others, and where each clock has a file of its own."""
     from pipelines.export.waveforms import files_of_waveforms
 

@@ -1,7 +1,5 @@
 """``tumbleline extend``: the next version of a model, one effect added or removed, and who changed it, when and why."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -116,7 +114,7 @@ def _refuse_contradiction(model: Path, effect: str, remove: str, reason: str) ->
         raise WrongUse(f"extend: {model} does not exist, --remove needs a model file; correct the name")
 
 
-def _start(model: Path, effects: str, step: ModelStep) -> tuple[str, bool]:
+def _start(model: Path, effects: str, step: "ModelStep") -> tuple[str, bool]:
     """The text to extend, and whether the file is new."""
     from pipelines.jobs.model_files import STARTING_MODEL, model_text, new_model
 

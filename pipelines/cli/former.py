@@ -7,8 +7,6 @@ that becomes an argument goes to the end; ``+--option text`` adds a text to the 
 ``--history`` stays beyond that release: other programs are written against it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 

@@ -1,7 +1,5 @@
 """Commands that have subcommands."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +17,7 @@ class _Subcommands(TyperGroup):
 
     usual = ""
 
-    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: "Context", args: list[str]) -> list[str]:
         """The arguments, with the usual subcommand added where none is given."""
         args = [SPELLED.get(args[0], args[0]), *args[1:]] if args else args
         if self.usual and (not args or args[0] not in {*self.commands, "--help", "-h"}):

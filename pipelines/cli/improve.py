@@ -1,7 +1,5 @@
 """``tumbleline improve``: diagnose a model, add the effects that are missing, and judge them by a fresh run, in one command."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
@@ -152,7 +150,7 @@ class _Terminal(Attendant):
         if not self._quiet:
             say(f"\nDiagnosis with {', '.join(added)}", style="bold cyan")
 
-    def diagnosed(self, made: Examination, *, first: bool) -> None:
+    def diagnosed(self, made: "Examination", *, first: bool) -> None:
         """Prints a diagnosis with its picture the first time, as its verdict alone later."""
         from pipelines.cli.text.diagnosis_text import print_diagnosis
         from pipelines.cli.text.verdict_text import print_verdict
@@ -174,7 +172,7 @@ class _Terminal(Attendant):
             question = f"These data do not separate {effect} from {listed}. Add the first, {effect}, to {target}?"
         return agreed(question, CHOICES, UNATTENDED)
 
-    def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
+    def fresh_run(self) -> "tuple[str, pd.DataFrame, pd.DataFrame | None] | None":
         """A fresh run of the archive, or one that the station measures now."""
         from pipelines.cli.inputs import dwells_and_history
 

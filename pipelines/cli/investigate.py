@@ -99,7 +99,6 @@ def command(
 
 
 def _answer(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
-    """The answer at the terminal to a proposed follow-up."""
     from pipelines.cli.terminal import agreed
     from pipelines.cli.text.diagnosis_text import print_next_measurement
 

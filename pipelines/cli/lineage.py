@@ -1,7 +1,5 @@
 """``tumbleline lineage``: from a certificate to the raw samples and back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -64,7 +62,7 @@ def command(
         say(f"RO-Crate with {number_of(copied, 'file')} in {crate}")
 
 
-def _print(tree: Tree) -> None:
+def _print(tree: "Tree") -> None:
     """Print a tree: its lines are continued below at a terminal, and as long as they need to be in a pipe."""
     from pipelines.cli.console import limited
 

@@ -1,7 +1,5 @@
 """Commands to give next, as lines that can be pasted: every file, run and archive in them exists, and every word is quoted."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """``tumbleline noise``: Allan deviation of a record with the noise terms that it needs, and its power spectral density."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import isnan
 from pathlib import Path
@@ -209,7 +207,7 @@ def _print_psd(document: dict[str, Any]) -> None:
 
 def even_series(
     source: str, columns: Sequence[str], unit_of: str, rate: float | None, archive: str | None, stretch: int | None
-) -> EvenSeries | None:
+) -> "EvenSeries | None":
     """The samples of a file or an import; None for a captured run, which has figures of its own.
 
     columns, unit_of : as they were given; rate in Hz

@@ -1,7 +1,5 @@
 """``tumbleline plan``: effects, errors and station time of a recipe; a quicker one; a device; a line; the keys of files."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -258,14 +256,14 @@ def _densities(noise: str) -> tuple[float | None, float | None]:
 NOISE = {key: Setting("N", "", float, 0.0) for key in ("noise", "flicker")}
 
 
-def write_page(page: Path, document: dict[str, Any], context: PlanContext) -> None:
+def write_page(page: Path, document: dict[str, Any], context: "PlanContext") -> None:
     """Write the page."""
     from pipelines.report.plan import render_plan
 
     files.publish(page, render_plan(document, context).encode(), "plan", files.ELSEWHERE)
 
 
-def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
+def write_pictures(folder: Path, document: dict[str, Any], context: "PlanContext") -> None:
     """Write each picture to a file."""
     from pipelines.drawing.vector import alone
     from pipelines.report.plan import pictures

@@ -1,7 +1,5 @@
 """``tumbleline release``: release a model to the line from a date, or list the releases."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -98,7 +96,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
     give({"archive": str(store.root), "releases": rows}, lambda _: _print(store, records, valid), as_json=as_json)
 
 
-def _print(store: Archive, records: list[Release], valid: set[int]) -> None:
+def _print(store: Archive, records: "list[Release]", valid: set[int]) -> None:
     if not records:
         say(f"no model is released in {store.root}; release one with 'tumbleline release'")
         return
@@ -111,11 +109,11 @@ def _print(store: Archive, records: list[Release], valid: set[int]) -> None:
         say(f"  {record.number}: {record.reason}{' (forced)' if record.forced else ''}")
 
 
-def _name(record: Release) -> str:
+def _name(record: "Release") -> str:
     return f"{record.model.model_name} version {record.model.model_version}"
 
 
-def _where(record: Release) -> str:
+def _where(record: "Release") -> str:
     return f"{record.device} on {record.station}".removeprefix(" on ").removesuffix(" on ") or "all"
 
 

@@ -65,7 +65,6 @@ def _print(document: dict[str, Any]) -> None:
 
 
 def _lines(name: str, row: dict[str, Any]) -> list[list[str]]:
-    """A group with the old and the new model."""
     lines = [[name, "old", str(row["units"])], ["", "new", ""]]
     for number, line in enumerate(lines):
         rate = row["yield"][number]

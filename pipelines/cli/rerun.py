@@ -1,7 +1,5 @@
 """``tumbleline rerun``: re-analysis of archived runs with the present code, another model or other limits."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -78,13 +76,13 @@ def command(
     conclude(document, partial(_print, done, archive), as_json=as_json, passed=not document["failed"])
 
 
-def _counts(outcomes: list[RerunOutcome]) -> dict[str, int]:
+def _counts(outcomes: "list[RerunOutcome]") -> dict[str, int]:
     failed = sum(bool(outcome.error) for outcome in outcomes)
     anew = sum(bool(outcome.new) and outcome.new != outcome.run for outcome in outcomes)
     return {"selected": len(outcomes), "rerun": anew, "unchanged": len(outcomes) - anew - failed, "failed": failed}
 
 
-def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str, Any]) -> None:
+def _print(outcomes: "list[RerunOutcome]", archive: str | None, document: dict[str, Any]) -> None:
     lines = [_line(outcome) for outcome in outcomes[:SHOWN] if not outcome.error]
     if lines:
         print_table(["run", "re-run", "changed", "stages computed"], lines, fixed=2)
@@ -106,7 +104,7 @@ def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str
     )
 
 
-def _line(outcome: RerunOutcome) -> list[str]:
+def _line(outcome: "RerunOutcome") -> list[str]:
     whats = dict.fromkeys(change["what"] for change in outcome.because)
     worked = [name for name, how in outcome.stages.items() if how == "computed"]
     return [
@@ -117,7 +115,7 @@ def _line(outcome: RerunOutcome) -> list[str]:
     ]
 
 
-def _print_check(results: list[Reproduction]) -> None:
+def _print_check(results: "list[Reproduction]") -> None:
     tables = 0
     for result in results:
         tables += sum(how == "same bytes" for how in result.tables.values())

@@ -213,7 +213,6 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
 
 
 def _state(calibration: Calibration, day: str) -> str:
-    """Its state on a day."""
     return "expired" if calibration.state == "valid" and day >= calibration.until else calibration.state
 
 

@@ -1,7 +1,5 @@
 """``tumbleline simulate``: a trajectory through a calibrated unit, as raw output with its errors, to test software with."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -81,7 +79,7 @@ def command(
     give(simulation_document(made, fit, low_pass, begin, output), _print, as_json=as_json)
 
 
-def _low_pass(bandwidth_hz: float, rate_hz: float) -> OutputFilter:
+def _low_pass(bandwidth_hz: float, rate_hz: float) -> "OutputFilter":
     from inertial.dynamics.output_filter import designed
 
     try:
@@ -90,7 +88,7 @@ def _low_pass(bandwidth_hz: float, rate_hz: float) -> OutputFilter:
         raise WrongUse(f"--bandwidth: {problem}; give another, or a trajectory of a higher rate") from None
 
 
-def _print(document: SimulateDocument) -> None:
+def _print(document: "SimulateDocument") -> None:
     of_unit = f"unit {document['unit']} of run {document['run']}, in {document['out_unit']}"
     say(f"{document['file']}: {document['samples']} samples of {of_unit}")
     for text in document["told"]:

@@ -1,7 +1,5 @@
 """``tumbleline station``: bring-up, recordings, state, self-test, log, operator, health and programming of a station."""
 
-from __future__ import annotations
-
 import re
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -228,7 +226,7 @@ def profiles(
     give({"profiles": rows}, lambda _: print_table(heads, lines), as_json=as_json)
 
 
-def _print_profile(profile: Profile) -> None:
+def _print_profile(profile: "Profile") -> None:
     """The registers or commands of a profile; registers on which sources disagree, one line each."""
     if profile.commands:
         lines = [[c.name, c.ask, c.tell, c.unit, c.disputed] for c in profile.commands]

@@ -1,7 +1,5 @@
 """``tumbleline station monitor``: whether the line is healthy, its numbers for Prometheus, and alerts to a web hook."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import nullcontext
@@ -85,7 +83,7 @@ def monitor(
     conclude(document, [*document["problems"], verdict], as_json=as_json, passed=document["ok"])
 
 
-def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits: Path | None) -> None:
+def _serve(monitor: "Monitor", host: str, port: int, poster: "Poster | None", audits: Path | None) -> None:
     from pipelines.cli.serving_pages import page_server, run_until_stopped
     from pipelines.monitoring.service import alerting, application
     from pipelines.serving.connections import listening_socket

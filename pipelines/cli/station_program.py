@@ -1,7 +1,5 @@
 """``tumbleline station program``: write the coefficients of a run into its devices, and verify them there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -89,7 +87,12 @@ def program(
 
 
 def _write_teds(
-    source: Run, chosen: Sequence[tuple[int, UnitCalibration]], config: StationConfig, sheet: str, *, as_json: bool
+    source: "Run",
+    chosen: "Sequence[tuple[int, UnitCalibration]]",
+    config: "StationConfig",
+    sheet: str,
+    *,
+    as_json: bool,
 ) -> NoReturn:
     """Write a data sheet into the memory of each device; Exit status 1: a unit failed."""
     from pipelines.certificates.measured import measured_on
@@ -113,7 +116,7 @@ def _print_teds(result: dict[str, Any]) -> None:
             say(f"  {sheet['unit']} failed at '{sheet['step']}': {sheet['reason']}")
 
 
-def _agreed(run: str, station: str, chosen: Sequence[tuple[int, UnitCalibration]]) -> bool:
+def _agreed(run: str, station: str, chosen: "Sequence[tuple[int, UnitCalibration]]") -> bool:
     from pipelines.cli.terminal import agreed
 
     for slot, unit in chosen:

@@ -1,7 +1,5 @@
 """``tumbleline verify``: check the archive for changed, missing and foreign files, or the files of a certificate."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -146,7 +144,7 @@ def check_certificates(
     conclude(document, lambda _: [_print_checked(checked) for checked in done], as_json=as_json, passed=accepted)
 
 
-def _document(file: CheckedFile) -> dict[str, Any]:
+def _document(file: "CheckedFile") -> dict[str, Any]:
     return {
         "file": file.path,
         "certificate": getattr(file.facts, "number", ""),
@@ -155,7 +153,7 @@ def _document(file: CheckedFile) -> dict[str, Any]:
     }
 
 
-def _print_checked(file: CheckedFile) -> None:
+def _print_checked(file: "CheckedFile") -> None:
     head = f"{file.path}: certificate {file.facts.number}, unit {file.facts.serial}" if file.facts else str(file.path)
     say(head, style="bold")
     for check in file.checks:
@@ -175,7 +173,7 @@ def _print_checked(file: CheckedFile) -> None:
         )
 
 
-def _needed(file: CheckedFile) -> str:
+def _needed(file: "CheckedFile") -> str:
     """How the origin can be proven: an archive proves the values of an XML, and nothing of the pages of a PDF."""
     signed = any(check.check == "signature" and check.state == "good" for check in file.checks)
     if file.path.suffix.lower() == ".pdf" and not signed:

@@ -90,7 +90,6 @@ class _InMemory:
 
 
 def _once(recipe: Recipe, chosen: Scene, seed: int, repeat: int, progress: Progress) -> list[pd.DataFrame]:
-    """Dwells and temperatures of one run."""
     units = [Unit(serial=f"DEMO-{k + 1}", slot=k) for k in range(UNITS)]
     lot = Lot(units=units, device=recipe.device, sensor_axes=recipe.sensor_axes, seed=seed, repeat=repeat)
     records = _InMemory()

@@ -12,7 +12,6 @@ from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.documents import DiscoveryDemo
 from schemas.errors import WrongUse
 
-LOTS = 400
 HARDENING = 12e-6  # 1/g²: the output of 1 g falls behind by 12 µg; what a lot's model leaves of it is a tenth of a dwell's noise
 
 

@@ -136,7 +136,6 @@ def _largest(findings: Findings, row: DiscoveryRow) -> float:
 
 
 def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverDocument:
-    """The document restricted to some drivers."""
     known = [row["name"] for row in document["drivers"]]
     for driver in drivers:
         if known and driver not in known:

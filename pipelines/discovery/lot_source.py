@@ -1,7 +1,5 @@
 """The lots of an archive for the evidence: scores of runs with the attributes of units and runs."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -49,7 +47,7 @@ class DiscoveryArchive:
         self.archive, self.store, self._change = archive, ScoreStore(archive), change
         self._device = device
 
-    def with_change(self, change: Callable[[ScoredLot], ScoredLot]) -> DiscoveryArchive:
+    def with_change(self, change: Callable[[ScoredLot], ScoredLot]) -> "DiscoveryArchive":
         """The same archive with another change of its lots."""
         other = DiscoveryArchive(self.archive, self.device, change)
         other.store = self.store

@@ -115,7 +115,6 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
 
 
 def _nights(folder: Place) -> list[dict[str, Any]]:
-    """The ledger's entries in order."""
     top = folder / "nights"
     paths = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
     return [files.read_json(path) for path in paths if path.name.endswith(".json")]

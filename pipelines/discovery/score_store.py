@@ -5,8 +5,6 @@ They are a sealed, derived cache: a file that was edited or has another layout i
 the products of the columns are stored once per file, as means.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import sys
@@ -56,7 +54,7 @@ class Products:
     size: Array
     runs: int
 
-    def with_more(self, other: Products) -> Products:
+    def with_more(self, other: "Products") -> "Products":
         """Means over the runs of both."""
         total = self.runs + other.runs
         means = {

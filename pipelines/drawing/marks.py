@@ -127,7 +127,6 @@ def _bars(trace: Trace, area: PlotArea, scale: ColourScale | None) -> str:
 
 
 def _boxes(left: Array, right: Array, low: Array, high: Array) -> str:
-    """Rectangles as one path."""
     edges = zip(left, right, low, high, strict=True)
     return "".join(f"M{a:.1f} {z:.1f}V{t:.1f}H{b:.1f}V{z:.1f}z" for a, b, z, t in edges)
 

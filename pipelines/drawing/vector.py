@@ -153,7 +153,6 @@ def _foot(ticks: Ticks, wide: float) -> float:
 
 
 def _axes(plot: Plot, area: PlotArea, scaled: tuple[_Scaled, _Scaled], foot: float, *, labelled: bool) -> str:
-    """Grid, ticks, labels and the lines of the two axes."""
     across, along = scaled
     base = area.top + area.height
     x_ticks = [(float(area.x(np.array([value]))[0]), text) for value, text in across.ticks]
@@ -233,7 +232,6 @@ def _legend_lines(names: list[tuple[str, str]]) -> list[list[tuple[float, str, s
 
 
 def _bar(scale: ColourScale, x: float, y: float, height: float) -> str:
-    """The colour scale as a bar with its ticks."""
     steps = 48
     share = (np.arange(steps) + 0.5) / steps
     colours = shade(scale.low + share * (scale.high - scale.low), scale)

@@ -1,7 +1,5 @@
 """A recording corrected with a calibration: specific force, its covariance, and the bias where the force is known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any

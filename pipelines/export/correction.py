@@ -1,7 +1,5 @@
 """A correction as it is ordered and reported: how the bias is tracked, and the document of what was done."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -19,8 +19,6 @@
     304     uint32    CRC-32 (ISO-HDLC) of all bytes before
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The JSON documents of a corrected recording and of a simulated one: keys that other programs read."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from typing_extensions import TypedDict

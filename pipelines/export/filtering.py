@@ -1,7 +1,5 @@
 """A low-pass filter behind a correction: chosen from the measured bandwidth, run by sample, its state stored between files."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -179,7 +177,6 @@ def write_state(path: Path, state: Kept) -> None:
 
 
 def _plain(content: dict[str, Any]) -> dict[str, Any]:
-    """Values for JSON: arrays as lists."""
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in content.items()}
 
 

@@ -4,8 +4,6 @@ M is a polynomial that was fitted over the measured temperatures alone: beyond t
 axis without an output has the force along it in g as its u: its row of M is that of the identity, and its β is 0.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Terms that a format cannot hold, each with the error of the corrected output, µg, at 1 g over the measured temperatures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product

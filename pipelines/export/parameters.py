@@ -1,7 +1,5 @@
 """Parameters of autopilots: an offset in m/s² and a scale per axis, applied as (a − offset)·scale, and its temperature."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

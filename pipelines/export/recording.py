@@ -1,7 +1,5 @@
 """A recording of raw output as arrays: times, outputs, conditions and, where it is known, the true force."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

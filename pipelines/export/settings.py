@@ -1,7 +1,5 @@
 """What an export states that a run does not contain: conventions of the receiver, and what its firmware does besides."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -99,7 +97,6 @@ class ExportSettings:
     data_sheet: DataSheet | None = None
 
     def __post_init__(self) -> None:
-        """Refuses settings outside their range."""
         if self.arithmetic not in ARITHMETICS:
             raise WrongUse(
                 f"--set arithmetic: found '{shown(self.arithmetic)}'; {did_you_mean(self.arithmetic, ARITHMETICS)}"

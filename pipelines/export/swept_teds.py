@@ -1,7 +1,5 @@
 """TEDS of a sweep: sensitivity at the reference frequency, and the transfer function where template 25 can hold it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -7,8 +7,6 @@ basic TEDS; units, ranges and tolerances of template 25); the readers SDLMA-Core
 ``TEDS.cpp`` (widths, checksum); L-Card ``ltedsapi_stdtmpl.h`` (meaning of the enumerations and of the transfer function).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, fields

@@ -1,7 +1,5 @@
 """A trajectory through a calibrated unit: the raw output, with all of its errors, that the unit would have given."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass, replace
 from pathlib import Path

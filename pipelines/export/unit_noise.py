@@ -1,7 +1,5 @@
 """Noise of a unit for export: the terms N, B and K of its static record by axis."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 A writer gives the bytes of the file, so that all formats are written in one way: complete or not at all.
 """
 
-from __future__ import annotations
-
 import io
 import warnings
 from collections.abc import Callable, Sequence

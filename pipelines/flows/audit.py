@@ -94,5 +94,4 @@ def _summary(audit_result: Audit, listed: list[AuditFinding], page: Path) -> str
 
 
 def _escaped(text: str) -> str:
-    """Text with the special characters of Markdown escaped."""
     return re.sub(r"([*_`<>\[\]|])", r"\\\1", text)

@@ -4,8 +4,6 @@ The unit of a counter is what the file states, else what its steps allow; if the
 that contradicts the file is refused; a unit that contradicts the steps gives a remark.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

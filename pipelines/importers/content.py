@@ -1,7 +1,5 @@
 """The result of a reader: a table of columns, and the statements of the file about them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The JSON documents of imports: keys that other programs read."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict

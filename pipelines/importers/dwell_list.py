@@ -1,7 +1,5 @@
 """List of the dwells of an import: times, means, noise, and with a fit by the norm residual and influence."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping as Mapping_
 from typing import Any
 

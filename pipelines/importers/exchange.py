@@ -1,7 +1,5 @@
 """Dwells and temperature histories in the exchange format, from a file or from a run of the archive."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files of other systems as tables of columns; the first bytes decide on the format, not the name."""
 
-from __future__ import annotations
-
 import hashlib
 import stat
 from collections.abc import Sequence
@@ -32,7 +30,7 @@ class SourceFile:
     sha256: str
     size: int
     form: str
-    parts: tuple[SourceFile, ...] = ()
+    parts: "tuple[SourceFile, ...]" = ()
 
     def as_dict(self) -> SourceDocument:
         """JSON-able."""

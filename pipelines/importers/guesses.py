@@ -1,7 +1,5 @@
 """Guesses of the meaning of the columns of an unknown file, with reasons: proposals for the user, never used by an import."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Inspection of a file: its content, its probable meaning, its faults, and the command that imports it."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -134,7 +132,6 @@ def _of_points(path: Path, seen: Recognition, meanings: Mapping[str, str]) -> In
 
 
 def _content_of_dwells(table: pd.DataFrame) -> str:
-    """The content of the table as a sentence."""
     names = set(table.columns)
     if set(FORCE_COLUMNS) <= names:
         reference = "the force on each axis"

@@ -1,7 +1,5 @@
 """The result of a fit at import, and the inputs of every such fit: dwells of one unit, and local gravity."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +29,7 @@ class FitAnswer:
     """Further tables for the archive: covariance, residuals."""
 
 
-def imported_dwells(data: Imported) -> pd.DataFrame:
+def imported_dwells(data: "Imported") -> pd.DataFrame:
     """The dwells of an import of one unit."""
     if data.dwells is None:
         raise DataRejected(

@@ -1,7 +1,5 @@
 """Imports in the archive: each is a run, named by the hash of its inputs, whose tables name source, parameters and code."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping as Parameters
 from typing import Any

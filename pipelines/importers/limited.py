@@ -4,8 +4,6 @@ A file decides what its parser does. One that never returns, or takes more memor
 and is refused in a sentence. The process is started at the first file, reused for the next, and ends with its parent process.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import signal
@@ -60,8 +58,6 @@ def limits_for(size: int) -> ReadingLimits:
 
 
 class _Reader:
-    """The process that reads."""
-
     def __init__(self) -> None:
         # -P and the path of this process: a module in the folder of the recordings is never imported
         environment = os.environ | ENVIRONMENT | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

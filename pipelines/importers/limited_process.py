@@ -3,8 +3,6 @@
 The limit of memory is beyond what the process has when it begins: libraries take address space too.
 """
 
-from __future__ import annotations
-
 import gc
 import math
 import os

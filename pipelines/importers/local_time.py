@@ -1,7 +1,5 @@
 """Local times without a zone: points in time where the zone is stated; else the hour that a change of the clock skips is told."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from datetime import datetime, timedelta
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError

@@ -1,7 +1,5 @@
 """Columns of an unknown file whose names alone tell what they are: those of the exchange format, serials, numbers of dwells."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Mapping
 

@@ -1,7 +1,5 @@
 """A recording turned about one axis of the sensor: bias, scale and misalignment of the axes in the plane."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,7 +47,7 @@ def axis_of_plane(dwells: pd.DataFrame) -> int | None:
     return quiet_axis(dwells[OUT].to_numpy(dtype=np.float64)) if force is None else plane_across(force)
 
 
-def plane(data: Imported, mapping: Mapping) -> FitAnswer:
+def plane(data: "Imported", mapping: Mapping) -> FitAnswer:
     """The answer of ``import --fit plane``, with known poses or by the norm of gravity."""
     dwells = imported_dwells(data)
     across = axis_of_plane(dwells)
@@ -66,7 +64,7 @@ def _gravity(dwells: pd.DataFrame, mapping: Mapping) -> float:
     return gravity_of(mapping) if known_force(dwells) is None else 1.0
 
 
-def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
+def shown_turn(data: "Imported", mapping: Mapping) -> FitAnswer | None:
     """The answer of a sensor that was turned about its quiet axis; None where its outputs do not show that it was.
 
     The norm of the two other axes is that of gravity in a turn. About a dead axis it is not, for the missing part changes.

@@ -1,7 +1,5 @@
 """Check of dwells against their stated faces: exchanged axes, inverted axes, or axes without a response."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy.optimize import linear_sum_assignment

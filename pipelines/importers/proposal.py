@@ -1,7 +1,5 @@
 """How a recognised recording is imported and fitted: the keys of the mapping, the fit, and the command that states them."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Sequence

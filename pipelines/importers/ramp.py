@@ -1,7 +1,5 @@
 """A temperature ramp in one pose: a cubic against the noise from sample to sample."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from inertial.fits.polynomial import fit_temperature_curve

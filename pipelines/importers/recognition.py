@@ -1,7 +1,5 @@
 """What a file of another system holds: columns, units, clock, stops, and how it is imported, for commands and pages."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

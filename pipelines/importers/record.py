@@ -1,7 +1,5 @@
 """Foreign columns turned into a raw record and its dwells; contradictions to the mapping are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -219,7 +217,6 @@ def _as_dwells(
     where: str,
     remarks: tuple[str, ...],
 ) -> Imported:
-    """A file whose rows are dwells."""
     count = pd.Series(serials).groupby(serials).cumcount().to_numpy()
     time = count.astype(np.float64)
     if "time" in columns:

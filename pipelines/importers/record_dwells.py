@@ -1,7 +1,5 @@
 """The dwells of an import: their numbers, the means of a record's stretches, their reference, and those that are held out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 

@@ -1,7 +1,5 @@
 """The time of a foreign record in seconds: any clock, no step back, no unknown gap."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping as Columns
 from collections.abc import Sequence
 from itertools import pairwise

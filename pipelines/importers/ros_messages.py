@@ -1,7 +1,5 @@
 """Messages of ROS as columns: nested fields by their path, arrays by element, the time of the header where it is stamped."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Samples that an axis repeats, and torn words: refused, left out or used, by the mapping."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +27,6 @@ class SampleFaults:
     bad: Flags
 
     def __bool__(self) -> bool:
-        """Whether there are faults."""
         return bool(self.frozen or self.torn)
 
     def sentences(self, time: Array) -> list[str]:

@@ -1,7 +1,5 @@
 """A record of evenly spaced samples from a file or an import: input of an Allan deviation or a spectrum."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One recording from several files: one after another, or side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

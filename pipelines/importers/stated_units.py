@@ -1,7 +1,5 @@
 """Units stated by files, in the names of the mapping: used if none is given; contradictions are reported."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from collections.abc import Mapping as Columns
 from typing import Any

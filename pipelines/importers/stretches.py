@@ -1,7 +1,5 @@
 """The static stretches of a record: by labels, by blocks, by positions logged back to back, or detected in the record itself."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -55,10 +53,9 @@ class Stretches:
     remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
-        """Their number."""
         return len(self.spans)
 
-    def only(self, numbers: Sequence[int]) -> Stretches:
+    def only(self, numbers: Sequence[int]) -> "Stretches":
         """Some of them, by their numbers from 0."""
         return Stretches(tuple(self.spans[k] for k in numbers), tuple(self.labels[k] for k in numbers), self.remarks)
 

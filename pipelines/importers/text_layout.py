@@ -4,8 +4,6 @@ Nothing is assumed about the beginning of a file, which often has settings of th
 further down, which are uniform, and the table begins with the first line of the same form.
 """
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import re

@@ -1,7 +1,5 @@
 """Text of numbers as columns: decoded, with its layout detected and stated; damaged rows are refused."""
 
-from __future__ import annotations
-
 import io
 import re
 import warnings

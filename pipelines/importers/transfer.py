@@ -1,7 +1,5 @@
 """A transfer function of another system: points from a CSV, judged as those of a sweep."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -114,7 +112,6 @@ def _as_radians(points: Points) -> Points:
 
 
 def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[str, pd.DataFrame]:
-    """Points and findings for the archive."""
     size, c = np.abs(points.value), points.conditions
     rows = pd.DataFrame(
         {

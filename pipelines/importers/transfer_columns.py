@@ -1,7 +1,5 @@
 """Columns of a transfer function in a file: which is frequency, magnitude, phase and their uncertainty, and in which units."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field

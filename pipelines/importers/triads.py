@@ -4,8 +4,6 @@ At rest the three outputs of an accelerometer lie on a sphere about its bias, an
 Another quantity does not: a gyroscope returns to its centre, a temperature stays on a line, two sensors have two spheres.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -98,7 +96,6 @@ class Triad:
     doubt: str = ""
 
     def __bool__(self) -> bool:
-        """Whether there are three columns."""
         return bool(self.names)
 
 

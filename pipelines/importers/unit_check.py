@@ -1,7 +1,5 @@
 """Check of the numbers of a record against the given unit of its output."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from inertial.arrays import Array

@@ -4,8 +4,6 @@ The limit applies to the unpacked size, in total and as a multiple of the packed
 of MATLAB, and for Parquet, whose dictionaries and runs of equal values unpack as well.
 """
 
-from __future__ import annotations
-
 import gzip
 import io
 import zlib

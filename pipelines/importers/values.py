@@ -1,7 +1,5 @@
 """Columns of foreign tables as numbers: other values, flags, dates and impossible values are refused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

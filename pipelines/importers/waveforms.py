@@ -1,7 +1,5 @@
 """Import of dynamic tests: waveforms of unit and reference, reduced and judged in the same way as those of a station."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -217,7 +215,6 @@ class _Recording(NamedTuple):
 
 
 def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWaveforms) -> _Recording:
-    """The channels of one file."""
     first, _, second = (piece.strip() for piece in layout.group.partition(","))
     content, source = files.read_content(path, first)
     other = files.read_content(path, second)[0] if second else content

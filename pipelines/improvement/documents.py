@@ -1,7 +1,5 @@
 """The JSON document of improve: keys that other programs read. A NotRequired key may be missing."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict

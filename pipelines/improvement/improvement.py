@@ -140,7 +140,6 @@ class Improvement:
         return ImprovedTables(self.tables.dwells, self.tables.history, again, temperatures), name
 
     def _diagnosis(self, effects: list[str] | None, *, first: bool) -> DiagnosisDocument:
-        """The diagnosis of a model, as the attendant sees it."""
         with self.attendant.working("looking for missing effects"):
             from pipelines.diagnosis.diagnose import examination  # loads the search for effects: after the first line
 
@@ -210,7 +209,6 @@ class Improvement:
         return (versions(model)[-len(added) - 1 :] if model else [judged]), text
 
     def _begun(self, effects: list[str], step: ModelStep) -> str:
-        """The first version of a new model file."""
         from inertial import effects as catalogue
         from inertial.effects.formula import Formula
         from pipelines.jobs.model_files import new_model

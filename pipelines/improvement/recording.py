@@ -1,7 +1,5 @@
 """A recording of another system as a run of the archive: recognised, imported and fitted, with the equivalent command."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -22,7 +20,7 @@ Working = Callable[[str], AbstractContextManager[Any]]
 
 def bring_in(
     paths: list[Path], archive: str | None, working: Working, group: str = "", join: str = ""
-) -> RecordingDocument | None:
+) -> "RecordingDocument | None":
     """The import of a recording as it is recognised; None for a table of dwells, which needs none.
 
     Parameters

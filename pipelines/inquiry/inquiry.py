@@ -179,7 +179,6 @@ class Inquiry:
         return self._follow_up(affordable, tuple(why(joint.state, self.effects, p) for p in affordable))
 
     def _follow_up(self, proposals: Sequence[Proposal], reasons: tuple[str, ...]) -> FollowUp:
-        """The follow-up that measures the proposals."""
         steps: list[SequenceStep] = [s for p in proposals for s in p.steps]
         job = follow_up(steps, self.base, self.jobs[-1], self.lineage.ids, "; ".join(reasons))
         job = replace(job, recipe=job.recipe.model_copy(update={"effects": list(self.effects)}))

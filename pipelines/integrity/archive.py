@@ -1,7 +1,5 @@
 """Checks of a whole archive, or of some of its runs with their captures, read side by side."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -84,7 +82,7 @@ def verify(
     archive: Archive,
     runs: Sequence[str] = (),
     *,
-    keys: Mapping[str, Ed25519PublicKey],
+    keys: "Mapping[str, Ed25519PublicKey]",
     demanded: bool = False,
     head: str = "",
     also: Sequence[Callable[[Archive, VerifiedPart], None]] = (),
@@ -129,7 +127,7 @@ def _chosen(archive: Archive, runs: Sequence[str]) -> list[Run]:
 def _verified(
     archive: Archive,
     runs: Sequence[str],
-    keys: Mapping[str, Ed25519PublicKey],
+    keys: "Mapping[str, Ed25519PublicKey]",
     *,
     demanded: bool,
     head: str,
@@ -179,7 +177,6 @@ def _verified(
 
 
 def _captures(archive: Archive, runs: Sequence[Run]) -> list[Place]:
-    """Folders of the captures that runs were made from."""
     named = dict.fromkeys(str(run.about.get("capture") or "") for run in runs)
     return [archive.root / "captures" / name for name in named if name and (archive.root / "captures" / name).is_dir()]
 
@@ -199,7 +196,6 @@ def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: Verifie
 
 
 def _below(folder: Place) -> list[Place]:
-    """Folders in a folder, by name."""
     if not folder.is_dir():
         return []
     return sorted((path for path in folder.iterdir() if path.is_dir()), key=lambda path: path.name)
@@ -221,7 +217,6 @@ def _report_untrusted(total: VerifiedPart, *, demanded: bool) -> None:
 
 
 def _trust(total: VerifiedPart) -> str:
-    """Sentence about the signatures."""
     count, signatures = total.manifests, total.signatures
     if signatures[UNSIGNED] == count:
         return "UNSIGNED: nothing shows who wrote this archive; make a key with 'tumbleline archive key'"

@@ -117,7 +117,6 @@ TOPS = ("runs", "captures", "calibrations", "chain")
 
 
 def _manifest_of(path: str) -> str:
-    """The manifest of a table."""
     file = PurePosixPath(path)
     if file.suffix not in {".parquet", ".html"}:
         return ""

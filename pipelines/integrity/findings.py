@@ -1,7 +1,5 @@
 """Findings of the checks, and counts of what was checked."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -49,7 +47,7 @@ class VerifiedPart:
     """
 
     root: Place
-    keys: Mapping[str, Ed25519PublicKey]
+    keys: "Mapping[str, Ed25519PublicKey]"
     findings: list[IntegrityFinding] = field(default_factory=list[IntegrityFinding])
     remarks: list[str] = field(default_factory=list[str])
     signatures: Counter[str] = field(default_factory=Counter[str])
@@ -59,11 +57,11 @@ class VerifiedPart:
     rows: int = 0
     bytes: int = 0
 
-    def blank(self) -> VerifiedPart:
+    def blank(self) -> "VerifiedPart":
         """A new part of the same archive with the same keys, without findings."""
         return VerifiedPart(self.root, self.keys)
 
-    def add(self, other: VerifiedPart) -> None:
+    def add(self, other: "VerifiedPart") -> None:
         """Add the findings and counts of another part."""
         self.findings += other.findings
         self.remarks += other.remarks

@@ -80,7 +80,6 @@ def _links(folder: str) -> Iterator[str]:
 
 
 def _all(root: Path) -> Iterator[tuple[str, Path]]:
-    """Files below a folder by name."""
     for folder, _, names in os.walk(root):
         for name in sorted(names):
             path = Path(folder) / name

@@ -1,7 +1,5 @@
 """A job: recipe, limits, lot and station together, and the names that follow from them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -84,7 +82,7 @@ class Job:
     captured: str = ""
     parents: tuple[str, ...] = ()
     prior: StoredFamily | None = None
-    full: Job | None = None
+    full: "Job | None" = None
 
     def __post_init__(self) -> None:
         """Formulas of the model are effects wherever this job is worked on."""

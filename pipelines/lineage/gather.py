@@ -105,7 +105,6 @@ class Gatherer:
         return ids
 
     def _tables(self, run: Run, raw: list[str], start: str) -> None:
-        """Add the tables of a run, stage by stage."""
         places = sorted(run.path.glob("*.json"), key=lambda path: path.name)
         manifests = {path.stem: files.read_json(path) for path in places if path.name not in {"run.json", SEALED}}
         steps: dict[str, list[str]] = {}

@@ -1,7 +1,5 @@
 """The lineage graph: nodes (files, runs, settings) and the steps that made nodes from other nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
@@ -77,7 +75,7 @@ class Graph:
                 steps_of.setdefault(node, []).append(step)
         return steps_of
 
-    def around(self, start: Iterable[str]) -> Graph:
+    def around(self, start: Iterable[str]) -> "Graph":
         """The part of the graph with the origin of these nodes and the results made from them."""
         start = list(start)
         up, steps_up = self._reached(start, forward=False)

@@ -103,7 +103,6 @@ def _activity(step: ProvActivity, graph: Graph, agents: dict[str, dict[str, Any]
 
 
 def _agents(step: ProvActivity, agents: dict[str, dict[str, Any]]) -> list[str]:
-    """The person and the program of a step."""
     software = step.about.get("software", {})
     labels = {"Person": step.person} if step.about.get("who") else {}
     if software:

@@ -31,7 +31,6 @@ class RunTime:
     door: int = 0
 
     def __add__(self, other: Self) -> Self:
-        """The sum of two runs, field by field."""
         return type(self)(
             **{field.name: getattr(self, field.name) + getattr(other, field.name) for field in fields(self)}
         )

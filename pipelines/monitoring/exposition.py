@@ -26,8 +26,6 @@ TIMES = {
 
 
 class _Collector:
-    """Collector for the Prometheus client library."""
-
     def __init__(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot
 

@@ -7,8 +7,6 @@ in ``clients/``; the system releases the lock when the client ends, also when it
 ends when no lock is held.
 """
 
-from __future__ import annotations
-
 import argparse
 import gc
 import os
@@ -104,7 +102,7 @@ def private_folder(path: Path) -> None:
     path.chmod(0o700)
 
 
-def _leave_when_alone(home: Path, server: uvicorn.Server) -> None:
+def _leave_when_alone(home: Path, server: "uvicorn.Server") -> None:
     while not server.should_exit:
         time.sleep(LOOK_S)
         try:

@@ -40,7 +40,7 @@ def discrimination_requirement(
     Raises WrongUse: fewer than two rivals, or an effect of the station among them.
     """
     model = [e for e in against.recipe.effects if e not in rivals]
-    effects = (*unit_effects(model), *rivals)
+    effects = (*(effect.id for effect in design.split(model)[0]), *rivals)
     _refuse(rivals, effects)
     columns = _columns(effects, against)
     rms = np.sqrt(np.mean(columns**2, axis=1))
@@ -63,11 +63,6 @@ def discrimination_requirement(
         effects=effects,
         discrimination=Discrimination(base, tuple(places), tuple(sizes), enough, units),
     )
-
-
-def unit_effects(model: Sequence[str]) -> tuple[str, ...]:
-    """The effects of a model whose coefficients belong to each unit, not to the station."""
-    return tuple(effect.id for effect in design.split(model)[0])
 
 
 def _refuse(rivals: Sequence[str], effects: Sequence[str]) -> None:

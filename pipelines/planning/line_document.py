@@ -94,7 +94,6 @@ def _rate(found: Shortest) -> LineRate:
 
 
 def _activities(line: Line, lot: str, fixture: str, placed: Placed, phases: Sequence[Phase]) -> list[LineActivity]:
-    """The activities of a lot, in order of time."""
 
     def activity(
         kind: str, begin: int, steps: int, resources: Sequence[str], temperature: float | None

@@ -1,7 +1,5 @@
 """Search for the recipe with the least station time that meets a requirement."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from contextlib import suppress
@@ -107,7 +105,7 @@ def optimise(
     return Optimum(best, identified(best), against, requirement, float(np.max(search.reached(best))), ramp)
 
 
-def _refusal(search: RecipeSearch) -> str:
+def _refusal(search: "RecipeSearch") -> str:
     """Why there is no recipe, the smallest ratio reached, and the lower bound of the station time."""
     requirement, near = search.requirement, search.nearest
     start = f"plan optimise: no recipe of up to {MOST} dwells "

@@ -181,7 +181,6 @@ def _coefficient(effect: str, name: str, axis: str, error: float, number: int) -
 
 
 def _unit(effect: str, number: int) -> str:
-    """Unit of an effect's coefficient."""
     known = catalogue.get(effect)
     return unit_texts(known, "µg")[number] if isinstance(known, SensorEffect) else "µrad"
 

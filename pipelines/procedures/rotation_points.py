@@ -77,17 +77,12 @@ def points_of_record(
         The readings of the encoder do not show the turns.
     """
     readings = record.samples[REFERENCE]
-    ends = np.radians([_angle(record, 0), *(turn.to_deg for turn in record.step.turns)])
+    pose, turns = record.step.pose, record.step.turns
+    begin = pose.outer_deg if turns[0].axis == "outer" else pose.inner_deg
+    ends = np.radians([begin, *(turn.to_deg for turn in turns)])
     sweeps, still = parts_of(readings.time, np.radians(readings.output[:, 0]), ends.tolist(), part.turns, part.stand_s)
     for unit in units:
         yield from _points(part, number, unit, sweeps, still, device)
-
-
-def _angle(record: ProcedureRecord, which: int) -> float:
-    """Commanded angle of the axis that turns (0), or of the other one (1), where the record begins."""
-    outer, inner = record.step.pose.outer_deg, record.step.pose.inner_deg
-    angles = (outer, inner) if record.step.turns[0].axis == "outer" else (inner, outer)
-    return angles[which]
 
 
 def _points(

@@ -1,7 +1,5 @@
 """Inputs of the panels of a run's report: the run, its tables, and the part of each unit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, Literal
@@ -56,12 +54,12 @@ class ReportContext:
         return str(self.tables["grades"].sort_values("slot")["rule"].iloc[0])
 
     @cached_property
-    def units(self) -> list[UnitContext]:
+    def units(self) -> "list[UnitContext]":
         """Every unit, by slot."""
         return [UnitContext(self, row) for row in rows_of(self.tables["grades"].sort_values("slot"))]
 
     @property
-    def calibrated(self) -> list[UnitContext]:
+    def calibrated(self) -> "list[UnitContext]":
         """The units that were not refused, by slot."""
         return [unit for unit in self.units if unit.outcome != "refused"]
 

@@ -33,11 +33,6 @@ def noise_chart(left: LotResiduals, floor_ug: float) -> Chart:
     return Chart("Residuals and noise", (_quantiles(left, floor_ug),), height=330)
 
 
-def _guide(end: float) -> Trace:
-    ends = np.array([-end, end])
-    return Trace("", ends, ends, "line", "muted", legend=False)
-
-
 def _named(axis: str) -> str:
     return axis if axis == "norm" else f"axis {axis}"
 
@@ -45,7 +40,8 @@ def _named(axis: str) -> str:
 def _quantiles(left: LotResiduals, floor_ug: float) -> Plot:
     """Ordered residuals over the noise floor against the normal distribution; the line is pure noise."""
     several = len(left.models) > 1
-    traces = [_guide(3.5)]
+    ends = np.array([-3.5, 3.5])
+    traces = [Trace("", ends, ends, "line", "muted", legend=False)]
     for label, values in left.models:
         ordered = np.sort(values[np.isfinite(values)]) / floor_ug
         step = max(1, ordered.size // MOST_POINTS)

@@ -227,7 +227,6 @@ def _about(driver: DriverValues) -> Array:
 
 
 def _product(driver: DriverValues, other: DriverValues) -> str:
-    """The label of the product of two quantities."""
     parts = [(part.label.partition(" / ")[0], part.label.partition(" / ")[2], part.name) for part in (driver, other)]
     names = [name if name in FORCES else f"({label} less its mean)" for label, _, name in parts]
     if parts[0] == parts[1]:
@@ -278,7 +277,11 @@ def effect_chart(view: EffectView, pick: Callable[[int, int], str] | None = None
     for name, residual in view.sides:
         traces = [between(x, -noise, noise, "noise, ± 2σ"), level(x, 0.0, dashed=False)]
         if name == "before":
-            traces += _fan(view)
+            others = [view.line(k) for k in range(len(view.units)) if k != view.shown][:FAN]
+            traces += [
+                Trace("the same, other units", *line, "line", "muted", width=1.0, legend=not k)
+                for k, line in enumerate(others)
+            ]
         role = "before" if name == "before" else "after"
         traces.append(
             Trace(f"residual {name}" if view.effect else "residual", x, residual, role=role, size=6.0, picks=picks)
@@ -292,11 +295,3 @@ def effect_chart(view: EffectView, pick: Callable[[int, int], str] | None = None
         there = tuple(trace for trace in traces if trace.x.size)
         plots.append(Plot(title if view.effect else view.where, PlotAxis(view.quantity), across, there))
     return Chart(view.title, tuple(plots), len(plots), height=330)
-
-
-def _fan(view: EffectView) -> list[Trace]:
-    """The curves of the other units."""
-    lines = [view.line(k) for k in range(len(view.units)) if k != view.shown][:FAN]
-    return [
-        Trace("the same, other units", *line, "line", "muted", width=1.0, legend=not k) for k, line in enumerate(lines)
-    ]

@@ -55,7 +55,6 @@ def _curves(document: dict[str, Any]) -> Chart:
 
 
 def _spectra(document: dict[str, Any]) -> Chart:
-    """Noise density of every channel against frequency."""
     lines = np.array(document["frequency_hz"])[1:]
     # so many points for each decade: a record of a million samples would be drawn as a black bar
     cell = np.floor(PER_DECADE * np.log10(lines / lines[0])).astype(int)

@@ -112,7 +112,7 @@ def _residuals(title: str, residuals: pd.DataFrame, against: tuple[str, str], si
             x = np.array([poses.index(str(pose)) + POSE_SHIFT[axis] for pose in of_axis["pose"]])
         else:
             x = of_axis[column].to_numpy(float) * shown_factor(column)
-        picks = _picks(unit, of_axis) if unit else ()
+        picks = tuple(f"{unit}:{int(dwell)}" for dwell in of_axis["dwell"]) if unit else ()
         error = BOTH_SIDES * of_axis["expected_ug"].to_numpy(float) if unit and "expected_ug" in of_axis else None
         traces.append(Trace(f"axis {axis}", x, y, role=role, size=size, texts=_told(of_axis), picks=picks, error=error))
         traces += [] if quantity == POSE else smooth(axis, x, y, role)
@@ -122,16 +122,11 @@ def _residuals(title: str, residuals: pd.DataFrame, against: tuple[str, str], si
 
 
 def _told(rows: pd.DataFrame) -> tuple[str, ...]:
-    """Residuals as texts."""
     columns = (rows[name] for name in ("axis", "pose", "dwell", "residual_ug"))
     return tuple(
         f"{axis}, pose {pose}, dwell {int(dwell)}: {left:.4g} µg"
         for axis, pose, dwell, left in zip(*columns, strict=True)
     )
-
-
-def _picks(unit: str, rows: pd.DataFrame) -> tuple[str, ...]:
-    return tuple(f"{unit}:{int(dwell)}" for dwell in rows["dwell"])
 
 
 def _soak_means(dwells: pd.DataFrame) -> pd.Series:

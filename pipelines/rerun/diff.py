@@ -173,7 +173,8 @@ def _chosen(a: Run, b: Run) -> list[dict[str, Any]]:
     if limits[0] != limits[1]:
         first, second = (limit or {} for limit in limits)
         decided = [key for key in ("rule", "coverage_factor", "grade") if first.get(key) != second.get(key)]
-        named = _changed_figures(first, second)
+        old, new = first.get("figures", {}), second.get("figures", {})
+        named = ", ".join(name for name in {**old, **new} if old.get(name) != new.get(name))
         if named or not decided:
             rows.append(_row("limits", named, *(limit.get("name", "none") for limit in (first, second))))
         rows += [_row("limits", key, *(limit.get(key, "none") for limit in (first, second))) for key in decided]
@@ -192,12 +193,6 @@ def _model_text(model: dict[str, Any], other: dict[str, Any]) -> str:
     if more or len(model["effects"]) < len(other["effects"]):
         return " + ".join([f"{len(model['effects']) - len(more)} effects", *more])
     return ", ".join(model["effects"]) or "none"
-
-
-def _changed_figures(before: dict[str, Any], after: dict[str, Any]) -> str:
-    """The figures whose limits differ."""
-    a, b = before.get("figures", {}), after.get("figures", {})
-    return ", ".join(name for name in {**a, **b} if a.get(name) != b.get(name))
 
 
 def _manifests(a: Run, b: Run) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:

@@ -82,7 +82,6 @@ def _changed(run: Run, step: StageCall, changed: list[str]) -> None:
 
 
 def _difference(before: pd.DataFrame, after: pd.DataFrame) -> str:
-    """The difference between two tables, as text."""
     if list(before.columns) != list(after.columns):
         other = sorted(set(before.columns) ^ set(after.columns))
         return f"other columns ({', '.join(other) or 'in another order'})"

@@ -150,7 +150,6 @@ def _change(stage: str, what: str, before: str, after: str) -> dict[str, str]:
 
 
 def _short_text(value: Any) -> str:
-    """A parameter in short."""
     if isinstance(value, dict):
         return str(value.get("name", "")) or "…"
     items = value if isinstance(value, list) else [value]

@@ -230,7 +230,6 @@ def _coefficients(evidence: GradeEvidence, zero_g: float) -> tuple[LotCoefficien
 
 
 def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
-    """Rows that all have the same columns as a table."""
     return pd.DataFrame({name: [row[name] for row in rows] for name in (rows[0] if rows else ())})
 
 
@@ -289,6 +288,7 @@ def _grade_row(verdict: dict, outcome: str, best: str, reasons: str, risk: float
 
 def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Limits) -> dict[str, object]:
     decision = next((d for d in decisions if d.figure == figure.name), None)
+    has_least = any(limit.min is not None for limit in limits.figures.values())  # ``limit`` is an upper limit
     return {
         "unit": unit,
         "figure": figure.name,
@@ -301,10 +301,5 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
         "accept": decision.accept if decision else np.nan,
         "pfa": decision.pfa if decision else np.nan,
         "pfr": decision.pfr if decision else np.nan,
-        **({"least": decision.limit if decision and decision.least else np.nan} if has_least(limits) else {}),
+        **({"least": decision.limit if decision and decision.least else np.nan} if has_least else {}),
     }
-
-
-def has_least(limits: Limits) -> bool:
-    """Whether any limit is a lower limit: such figures have the column ``least``, because ``limit`` is an upper limit."""
-    return any(figure.min is not None for figure in limits.figures.values())

@@ -112,7 +112,6 @@ def _reading_faults(readings: pd.DataFrame) -> list[DataFault]:
 
 
 def _sample_faults(answered: pd.DataFrame, summaries: pd.DataFrame) -> list[DataFault]:
-    """Faults of the samples, record by record."""
     known = {(row["record"], row["unit"]): row for row in summaries.to_dict("records")}
     faults: list[DataFault] = []
     for record in summaries["record"].unique():

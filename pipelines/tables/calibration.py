@@ -1,7 +1,5 @@
 """Conversion of a fitted calibration to tables and back; fit writes the tables; verify, noise, grade and export read them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

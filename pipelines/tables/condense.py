@@ -1,7 +1,5 @@
 """Reduction of long runs: consecutive dwells of one pose are averaged, or only every k-th dwell is used."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray

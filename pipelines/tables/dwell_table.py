@@ -1,7 +1,5 @@
 """Conversion of a table of dwells to arrays, used by all readers: one row for each unit, every column read once."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Any
 

@@ -5,8 +5,6 @@ needs every dwell of every unit and a reference force, as a fit in the output's 
 fitted in :attr:`LotTables.parts`, or, for values that all units share, as :attr:`LotTables.with_gaps`. All have the same state.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -51,7 +49,7 @@ class Measured:
     state: State
     reference: str
 
-    def pick(self, units: list[int]) -> Measured:
+    def pick(self, units: list[int]) -> "Measured":
         """The dwells of the units with these indices."""
         index = np.asarray(units, dtype=np.intp)
         values = {field.name: getattr(self.readings, field.name) for field in fields(self.readings)}
@@ -101,7 +99,7 @@ class LotTables:
     history: pd.DataFrame | None
 
     @cached_property
-    def parts(self) -> tuple[LotTables, ...]:
+    def parts(self) -> "tuple[LotTables, ...]":
         """The lot in parts whose units have the same dwells: the whole lot where no unit lacks a dwell that another has."""
         sets = dwells_of_units(self.dwells)
         if len(set(sets.values())) <= 1:

@@ -1,18 +1,14 @@
 """The rows of a table by unit, as arrays: every column is read once, for any number of units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache, lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from pandas.api.extensions import ExtensionArray
+from pandas.api.extensions import ExtensionArray
 
 
 class ByUnit:
@@ -41,7 +37,7 @@ class ByUnit:
             self._columns[name] = np.ascontiguousarray(self._table[name].to_numpy())
         return self._columns[name]
 
-    def of(self, unit: str) -> UnitRows:
+    def of(self, unit: str) -> "UnitRows":
         """The rows of a unit, in their order; empty for an unknown unit."""
         if self._together:
             return UnitRows(self, self._places.get(unit, slice(0, 0)))

@@ -1,7 +1,5 @@
 """Values of the types of JSON."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields, is_dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Dwells that a person leaves out: their names as they are given, and the table without them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import TypeAlias
 

@@ -4,8 +4,6 @@ The lot is linear about one point, the fit of an ellipsoid with the noise betwee
 finding that point: it would carry their error into all the others.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Dwells as the lot that a verdict on a model rests on: long runs reduced, units with a data fault left out."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 

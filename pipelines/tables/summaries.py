@@ -1,7 +1,5 @@
 """One pass over the samples of a run: a row for every unit and record, the input of validation and reduction."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
@@ -65,7 +63,6 @@ def unit_means(table: pd.DataFrame) -> dict[str, Array]:
 def _of_record(
     record: int, tables: Iterator[pd.DataFrame], full: pd.Series, zero_output: float, letters: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
-    """The rows of one record, from all of its tables."""
     known: dict[str, dict[str, Any]] = {}
     for table in tables:
         for unit, part in _parts(table, record, full, zero_output, letters):

@@ -63,7 +63,6 @@ def create_app(settings: WorkbenchSettings, ending: Callable[[], bool] = lambda:
 
 
 def _problem(request: Request, problem: Exception) -> Response:
-    """An error that the user can correct, as a sentence."""
     return _answer(request, str(problem), 409 if isinstance(problem, Stale) else 422)
 
 

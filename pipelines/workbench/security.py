@@ -148,7 +148,6 @@ def _refused_to_change(headers: Headers, settings: WorkbenchSettings) -> str | N
 
 
 def _origins(headers: Headers, settings: WorkbenchSettings) -> set[str]:
-    """Origins of this service for a host name."""
     host = headers.get("host", "").lower()
     schemes = ("https",) if settings.tls else ("https", "http") if settings.proxied else ("http",)
     return {f"{scheme}://{host}" for scheme in schemes}

@@ -123,7 +123,6 @@ class AxisOrders:
                     self.orders.findings.change(name, "scale", scale * seen / abs(turned))
 
     def _stop(self) -> None:
-        """An order to stop on the way."""
         axis = axis_of(self.orders.target)
         start = axis.position()
         goal = self._goal(start, STOPPED_DEG * max(1.0, self._speed))

@@ -60,7 +60,6 @@ class BringUp:
     target: Target = field(init=False)
 
     def __post_init__(self) -> None:
-        """Nothing is opened yet."""
         self.target = Target(SingleLink(self.device, self.profile, self.timeout_s), self.profile)
 
     def run(self) -> None:

@@ -3,8 +3,6 @@
 A recording comes from a result file: a MATLAB file with a rate, a unit and slots.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -53,7 +51,7 @@ class Recording:
     reference: Array
     reference_rate_hz: float
 
-    def reference_frame(self, record: int, start: float) -> pd.DataFrame:
+    def reference_frame(self, record: int, start: float) -> "pd.DataFrame":
         """The reference as samples, under a name that no serial can have."""
         import pandas as pd  # a watchdog opens the devices, and has no second for what it never makes
 

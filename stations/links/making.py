@@ -165,7 +165,6 @@ def _gated_link(
 def _gated_lines(
     wire: LineWire, name: str, profile: Profile, recorder: FrameRecorder | None, attempts: int, permit: Permit | None
 ) -> GatedLines:
-    """The gate before the text connection of a device."""
     if recorder is not None:
         recorder.device(name, 0, name, profile)
         wire = RecordedLines(wire, recorder, name)

@@ -21,11 +21,6 @@ TERMS = LONGEST - SHORTEST + 1
 FASTEST = 0.5  # sample periods; the decimation filter of the reader averages faster changes
 
 
-def flicker_time_constants() -> Array:
-    """Time constants of the Ornstein–Uhlenbeck processes of the flicker noise, (17,), s."""
-    return np.array([0.1 * RATIO**k for k in range(SHORTEST, LONGEST + 1)])
-
-
 def flicker_variance(instability: float) -> float:
     """Variance of each process so that their sum has the bias instability B, in the square of its unit.
 
@@ -41,7 +36,8 @@ class UnitNoise:
     def __init__(self, preset: Preset, streams: Sequence[np.random.Generator]) -> None:
         self._preset = preset
         self._walk_step = preset.rate_random_walk_ug * 1e-6
-        self._tau = flicker_time_constants()
+        # time constants of the Ornstein–Uhlenbeck processes of the flicker noise, (17,), s
+        self._tau = np.array([0.1 * RATIO**k for k in range(SHORTEST, LONGEST + 1)])
         self._sigma = math.sqrt(flicker_variance(preset.bias_instability_ug * 1e-6))
         self._streams = list(streams)
         self._flicker = self._sigma * self._draw(1, TERMS)[0]

@@ -105,7 +105,6 @@ class Plant(World):
         self.advance(0)
 
     def _active(self, device_id: int) -> list[Fault]:
-        """Faults of a device that are active now."""
         now = self.now
         return [f for f in self.faults if f.device_id == device_id and f.order.at_s <= now < f.order.until_s]
 

@@ -132,8 +132,6 @@ _TASKS: set[asyncio.Task[None]] = set()  # requests under way: a loop itself kee
 
 
 class _TcpServer(ModbusTcpServer):
-    """Modbus TCP with the handler above."""
-
     def callback_new_connection(self) -> ServerRequestHandler:
         """The handler of a new connection."""
         return _Handler(self, self.trace_packet, self.trace_pdu, self.trace_connect)
@@ -162,7 +160,6 @@ class PlantServer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Stops the server and its thread."""
         if self._loop is not None and self._server is not None and self._thread.is_alive():
             asyncio.run_coroutine_threadsafe(self._server.shutdown(), self._loop).result(START_S)
         self._thread.join(START_S)

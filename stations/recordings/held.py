@@ -27,7 +27,6 @@ class Held:
     _last: float = 0.0
 
     def __post_init__(self) -> None:
-        """Remarks answer nothing."""
         self._left.extend(item for item in self.recording.items if not isinstance(item, Remark))
 
     def wire(self, link: str, where: str) -> "HeldWire":
@@ -81,8 +80,6 @@ class Held:
 
 @dataclass
 class _HeldLink:
-    """A link that answers from a recording."""
-
     held: Held
     link: str
     where: str

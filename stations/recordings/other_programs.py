@@ -91,8 +91,6 @@ class _Stream:
 
 @dataclass
 class _Pending:
-    """A request that waits for its answer."""
-
     at: float
     link: str
     device_id: int

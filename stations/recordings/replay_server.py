@@ -125,7 +125,6 @@ class ReplayServer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Ends the servers and their connections."""
         self._stack.close()
 
     def _listen(self, handler: type[socketserver.BaseRequestHandler], port: int) -> int:

@@ -97,9 +97,9 @@ class TransferEffect(DynamicEffect, ABC):
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         """The parameters, with bounds and starts that suit the points."""
 
-    @abstractmethod
     def factor(self, points: Conditions, values: Array) -> Complex:
         """The factor (n,) at the points for parameter values (p,); for values (p, k, 1) or (p, k, n) of k models (k, n)."""
+        return np.ones(len(points.frequency), dtype=np.complex128)
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
         """Factors, as of :meth:`factor`, of parameters of other effects at the points, by their names; none for most effects."""

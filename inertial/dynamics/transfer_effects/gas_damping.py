@@ -2,7 +2,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from inertial.dynamics.transfer_effects.base import AMBIENT_C, Array, Complex, Conditions, Parameter, TransferEffect
+from inertial.dynamics.transfer_effects.base import AMBIENT_C, Array, Conditions, Parameter, TransferEffect
 
 KELVIN = 273.15
 SUTHERLAND_K = 110.4  # of air; of nitrogen 107
@@ -25,9 +25,6 @@ class GasDamping(TransferEffect):
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         return (Parameter("gas_share", "1", -1.0, 3.0, (1.0,)),)
-
-    def factor(self, points: Conditions, values: Array) -> Complex:
-        return np.ones(len(points.frequency), dtype=np.complex128)
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
         """Factor (n,) of the damping ratio at the temperature of each point."""

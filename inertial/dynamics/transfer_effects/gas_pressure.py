@@ -2,7 +2,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from inertial.dynamics.transfer_effects.base import AMBIENT_HPA, Array, Complex, Conditions, Parameter, TransferEffect
+from inertial.dynamics.transfer_effects.base import AMBIENT_HPA, Array, Conditions, Parameter, TransferEffect
 
 FREE_PATH_UM = 0.068  # of air at 25 °C and 1013 hPa
 LEAST_RATIO = 1.2  # of the largest pressure to the least
@@ -23,9 +23,6 @@ class GasPressure(TransferEffect):
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         return (Parameter("gap_um", "µm", 0.05, 500.0, (0.5, 3.0, 20.0), log=True),)
-
-    def factor(self, points: Conditions, values: Array) -> Complex:
-        return np.ones(len(points.frequency), dtype=np.complex128)
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
         """Factor (n,) of the damping ratio at the pressure of each point."""

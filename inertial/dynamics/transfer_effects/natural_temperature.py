@@ -2,7 +2,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from inertial.dynamics.transfer_effects.base import AMBIENT_C, Array, Complex, Conditions, Parameter, TransferEffect
+from inertial.dynamics.transfer_effects.base import AMBIENT_C, Array, Conditions, Parameter, TransferEffect
 
 LEAST_K = 10.0
 
@@ -17,9 +17,6 @@ class NaturalTemperature(TransferEffect):
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         return (Parameter("natural_tempco_per_K", "1/K", -3e-3, 3e-3, (0.0,)),)
-
-    def factor(self, points: Conditions, values: Array) -> Complex:
-        return np.ones(len(points.frequency), dtype=np.complex128)
 
     def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
         """Factor (n,) of the natural frequency at the temperature of each point."""

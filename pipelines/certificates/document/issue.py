@@ -38,7 +38,8 @@ def pdf(content: CertificateContent, xml: bytes, address: str = "") -> bytes:
         typst, or segno for a QR code, is not installed.
     """
     typst = library("typst", EXTRA, WHERE)
-    inputs: dict[str, Any] = page_content(content) | {"qr": _qr(address) if address else ""}
+    qr = library("segno", EXTRA, WHERE).make(address, error="m", micro=False).svg_inline(border=1) if address else ""
+    inputs: dict[str, Any] = page_content(content) | {"qr": qr}
     compiler = typst.Compiler(
         (resources.files("pipelines.certificates.document") / "certificate.typ").read_bytes(),
         font_paths=typst.Fonts(include_system_fonts=False, include_embedded_fonts=True),
@@ -46,11 +47,6 @@ def pdf(content: CertificateContent, xml: bytes, address: str = "") -> bytes:
     )
     issued = datetime.fromisoformat(content.issued).replace(tzinfo=UTC)
     return compiler.compile(format="pdf", pdf_standards="a-3b", timestamp=issued)
-
-
-def _qr(address: str) -> str:
-    segno = library("segno", EXTRA, WHERE)
-    return segno.make(address, error="m", micro=False).svg_inline(border=1)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """A diagnosis for people: verdict, picture, classes of missing effects, cost to decide, and the next command last."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,7 +20,7 @@ if TYPE_CHECKING:
 def print_diagnosis(
     document: DiagnosisDocument,
     *,
-    made: Examination | None = None,
+    made: "Examination | None" = None,
     data: FindData | None,
     model: Path | None,
     brief: bool = True,
@@ -56,7 +54,7 @@ def print_diagnosis(
         print_next_of_diagnosis(document, data, model)
 
 
-def _picture(made: Examination | None) -> None:
+def _picture(made: "Examination | None") -> None:
     if made is not None and made.diagnosis is not None:
         from pipelines.cli.text.effect_text import print_view
         from pipelines.report.effect_view import effect_views

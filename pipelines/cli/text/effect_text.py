@@ -1,7 +1,5 @@
 """The first picture of a diagnosis at a terminal: the residual against the quantity of the missing effect, before and after."""
 
-from __future__ import annotations
-
 import math
 from itertools import zip_longest
 from typing import TYPE_CHECKING
@@ -21,7 +19,7 @@ WIDEST, GAP = 120, 2
 LEAST = 36  # characters of a picture beside another one
 
 
-def print_view(view: EffectView) -> None:
+def print_view(view: "EffectView") -> None:
     """Print the picture, before and after beside each other where there is room."""
     width = min(console().width, WIDEST)
     sides = len(view.sides)
@@ -41,14 +39,14 @@ def print_view(view: EffectView) -> None:
     say(f"across: {view.quantity}", style="dim")
 
 
-def _line_is(view: EffectView) -> str:
+def _line_is(view: "EffectView") -> str:
     others = " (thin: the other units)" if len(view.units) > 1 else ""
     if not view.effect:
         return "a smooth curve" if view.curve is not None else "zero"
     return f"what {view.effect} explains{others}"
 
 
-def _side(view: EffectView, name: str, width: int) -> Text:
+def _side(view: "EffectView", name: str, width: int) -> "Text":
     residual = dict(view.sides)[name]
     x = view.x[view.shown]
     span = (float(np.nanmin(x)), float(np.nanmax(x)))

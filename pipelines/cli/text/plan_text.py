@@ -104,7 +104,6 @@ def _print_procedure_rows(document: dict[str, Any]) -> None:
 
 
 def _time(minutes: dict[str, float]) -> str:
-    """Station time, by what it goes into."""
     parts = " + ".join(
         f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total" and minutes[name] > 0.0
     )

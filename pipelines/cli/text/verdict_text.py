@@ -1,7 +1,5 @@
 """The verdict on the model of a run, and on its stated references, for people."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Run
@@ -16,7 +14,7 @@ if TYPE_CHECKING:
 STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}  # style of a verdict; None: it cannot be judged
 
 
-def print_verdict(document: DiagnosisDocument) -> None:
+def print_verdict(document: "DiagnosisDocument") -> None:
     """Print the verdict of a diagnosis."""
     from pipelines.diagnosis.sentences import verdict
 
@@ -38,7 +36,7 @@ def judged(document: dict[str, Any], run: Run) -> dict[str, Any]:
         return {**document, "adequacy": adequacy_of(run), "references": references_of(run)}
 
 
-def print_adequacy(verdict: AdequacyDocument | None) -> None:
+def print_adequacy(verdict: "AdequacyDocument | None") -> None:
     """Print whether the model of a run is adequate; nothing where there is no multi-position test."""
     if verdict is None:
         return
@@ -49,7 +47,7 @@ def print_adequacy(verdict: AdequacyDocument | None) -> None:
     say(text, style=STYLE_OF[verdict["adequate"]])
 
 
-def print_references(judged: ReferencesDocument | None) -> None:
+def print_references(judged: "ReferencesDocument | None") -> None:
     """Print whether the table is worse than stated, and what the run cannot show; nothing where nothing is stated."""
     from pipelines.jobs.references import contradiction, unseen
 

@@ -1,7 +1,5 @@
 """The export formats: each module of this package with a NAME and a ``write`` is a format, and is discovered here."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from importlib import import_module

@@ -1,7 +1,5 @@
 """ArduPilot: parameters INS_ACCOFFS, INS_ACCSCAL and INS_TCAL of one unit, as name,value lines."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Betaflight: the line ``set acc_calibration`` of one unit; offsets only, in whole counts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

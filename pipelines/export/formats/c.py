@@ -1,7 +1,5 @@
 """C: a C99 header with coefficients and checksum of every unit, and what applies them; low-pass and bias on request."""
 
-from __future__ import annotations
-
 import re
 import struct
 import zlib

@@ -1,7 +1,5 @@
 """CSV: one row per number, for spreadsheets."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """JSON: every unit with its polynomials, outcome, grade and certificate; nothing is left out."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 

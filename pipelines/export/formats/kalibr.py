@@ -1,7 +1,5 @@
 """Kalibr: imu.yaml of one unit with noise density and random walk of the accelerometer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MATLAB: a .mat file (version 5) with a structure per unit whose fields are the properties of accelparams."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Sequence

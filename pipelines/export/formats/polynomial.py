@@ -1,7 +1,5 @@
 """Polynomial of each axis: a = c0 + c1·ã + c2·ã² + c3·ã³ + kT·(T − T0), for correction axis by axis without a matrix."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence

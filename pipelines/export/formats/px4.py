@@ -1,7 +1,5 @@
 """PX4: CAL_ACC and TC_A parameters of one unit, in QGroundControl's columns (vehicle, component, name, value, type)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

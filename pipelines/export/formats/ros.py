@@ -1,7 +1,5 @@
 """ROS: parameters of the noise of one unit for nodes and simulators, and the covariance for sensor_msgs/Imu."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """TEDS: IEEE 1451.4 basic TEDS and template 25 of each axis with a voltage output, as bytes of a memory, with a text."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

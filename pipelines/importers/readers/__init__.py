@@ -4,8 +4,6 @@ A module states ``NAME`` (of the format in the archive), ``TITLE`` (for people),
 it needs, or empty), ``ORDER`` (order in which readers are tried), ``recognised`` and ``read``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib import import_module
 from pkgutil import iter_modules

@@ -1,7 +1,5 @@
 """DataFlash logs (.bin) of ArduPilot: the fields of one message, with time from its clock and the units that the log states."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any

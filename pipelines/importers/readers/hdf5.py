@@ -1,7 +1,5 @@
 """HDF5, which MATLAB 7.3 also writes: numeric datasets as columns, by their paths with dots."""
 
-from __future__ import annotations
-
 import io
 from collections import Counter
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """enDAQ and Mide recorders (.ide): the subchannels of one channel, each channel with a separate clock."""
 
-from __future__ import annotations
-
 import io
 import math
 import re

@@ -4,8 +4,6 @@ Source: National Instruments, "Specification for the LabVIEW Measurement File (.
 each ended by ``***End_of_Header***``, then a line of column names.
 """
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

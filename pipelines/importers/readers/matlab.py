@@ -6,8 +6,6 @@ The library takes types of elements as places in a list without looking whether 
 corrupted bytes end the process. So every element is looked at first.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """MCAP recordings: the numbers of one topic, of ROS 1, ROS 2 or JSON messages, with the time of their headers."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """MDF files of measurement systems in vehicles (.mf4, .mdf, .dat): the channels of one group with their master."""
 
-from __future__ import annotations
-
 import io
 from typing import Any
 

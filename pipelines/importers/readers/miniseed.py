@@ -1,7 +1,5 @@
 """miniSEED of seismometers and accelerometers (FDSN): the channels of one station, with time from their records."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """NumPy arrays, one in a file: the columns of a matrix, or the named fields of records."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

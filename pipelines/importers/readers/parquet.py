@@ -1,7 +1,5 @@
 """Parquet files as columns: plain columns, whatever notes of other libraries lie beside them."""
 
-from __future__ import annotations
-
 import re
 
 import pandas as pd

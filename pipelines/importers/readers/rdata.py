@@ -1,7 +1,5 @@
 """R's files (.rda, .RData, .rds): data frames as columns."""
 
-from __future__ import annotations
-
 import bz2
 import lzma
 from typing import Any, cast

@@ -1,7 +1,5 @@
 """Bags of ROS 1 (.bag): the numbers of one topic, with the time of their headers."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Bags of ROS 2 in SQLite (.db3): the numbers of one topic, with the time of their headers."""
 
-from __future__ import annotations
-
 import sqlite3
 import tempfile
 from contextlib import closing

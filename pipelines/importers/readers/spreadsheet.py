@@ -1,7 +1,5 @@
 """Spreadsheets (.xlsx, .xls, .xlsb, .ods): the rows of one sheet, read as the text that it would be saved as."""
 
-from __future__ import annotations
-
 import csv
 import datetime as dt
 import io

@@ -1,7 +1,5 @@
 """TDMS files of National Instruments: the channels of a group, with time from their waveform properties."""
 
-from __future__ import annotations
-
 import io
 import logging
 from collections.abc import Generator

@@ -1,7 +1,5 @@
 """Delimited text: one row per line, divided by tabs, commas, semicolons, bars or blanks."""
 
-from __future__ import annotations
-
 from pipelines.importers import text_table
 from pipelines.importers.content import Content
 

@@ -4,8 +4,6 @@ Source: SDRC Universal File Formats, Universal Dataset Number 58. Function type 
 frequency; ordinate type 12 is acceleration.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager

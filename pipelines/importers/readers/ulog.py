@@ -1,7 +1,5 @@
 """ULog of PX4 autopilots: the fields of one message, with time from its clock."""
 
-from __future__ import annotations
-
 import io
 from typing import Any
 

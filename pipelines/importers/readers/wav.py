@@ -1,7 +1,5 @@
 """WAV: channels as numbers of the converter, with the rate of the file. It states neither unit nor scale."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Worn loggers: CWA of Axivity, GT3X of ActiGraph, .bin of GENEActiv; acceleration with the temperature beside it."""
 
-from __future__ import annotations
-
 import io
 import tempfile
 import zipfile

@@ -1,7 +1,5 @@
 """Zip archives, also .npz: recognised, so that the refusal says what they are."""
 
-from __future__ import annotations
-
 from pipelines.importers.content import Content
 from pipelines.importers.readers import spreadsheet, wearable
 from schemas.errors import DataRejected

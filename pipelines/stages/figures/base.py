@@ -1,7 +1,5 @@
 """A figure of merit, the tables of one unit that it is computed from, and shared formulas."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -64,7 +62,7 @@ class LotCoefficients:
         self._known: dict[str, tuple[Array, Array]] = {}
         self._noise: dict[str, Array] = {}
 
-    def of(self, unit: int) -> UnitCoefficients:
+    def of(self, unit: int) -> "UnitCoefficients":
         """The coefficients of the unit with this index in the lot."""
         return UnitCoefficients(self, unit)
 

@@ -1,7 +1,5 @@
 """Inputs of a budget: the tables of a run, and the statements of station, device and certificate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -49,7 +47,7 @@ class BudgetTables:
         """The dwells of fit and verification."""
         return (self.lot or LotTables(self.dwells, self.history)).fitted_kinds
 
-    def parts(self) -> list[BudgetTables]:
+    def parts(self) -> "list[BudgetTables]":
         """The tables in parts whose units have the same dwells; empty where no unit was fitted."""
         lots = (self.lot or LotTables(self.dwells, self.history)).parts
         if self.coefficients.empty or len(lots) == 1:

@@ -1,7 +1,5 @@
 """The uncertainty budget of a lot as far as decisions read it, without its tables: quantities are computed when they are read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

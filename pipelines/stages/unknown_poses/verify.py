@@ -134,7 +134,6 @@ def verify_norms(
 
 
 def _verified(unit: NormDwells, gravity: float, widened: float) -> dict[str, pd.DataFrame]:
-    """The tables of one unit."""
     unseen = ~unit.design.used
     force = unit.lot.state.force[0, unseen]
     norm = np.linalg.norm(force, axis=1)

@@ -77,11 +77,6 @@ def station_named(known: Sequence[StationOfPage], name: str) -> StationOfPage:
     return station
 
 
-def station_at(known: Sequence[StationOfPage], address: str) -> StationOfPage:
-    """The station of a lot; the first for a lot of a station that this workbench was not started with."""
-    return next((station for station in known if station.address == address), known[0])
-
-
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Operator", 40, "/operator"
 REMEDIES = {
@@ -99,7 +94,10 @@ def operator(request: Request) -> Response:
     bench, state, problems = asked(request, OperatorPage)
     newest, known = lots.lots(bench.settings), stations_of(bench.settings)
     chosen = next((lot for lot in newest if lot.id == state.lot), None)
-    station = station_at(known, chosen.station) if chosen else station_named(known, state.station)
+    if chosen:  # a lot of a station that this workbench was not started with is shown with the first
+        station = next((station for station in known if station.address == chosen.station), known[0])
+    else:
+        station = station_named(known, state.station)
     here = [lot for lot in newest if lot.station == station.address]
     shown = chosen or next((lot for lot in here if not lot.ended), None)
     return page(

@@ -117,7 +117,6 @@ def plan(request: Request) -> Response:
 
 
 def _is_listed(row: Mapping[str, Any], state: PlanPage) -> bool:
-    """Whether the page's search finds an effect."""
     text = " ".join(str(row.get(key) or "") for key in ("effect", "why", "breaker", "alias")).lower()
     return state.search.lower() in text and not (state.only and row["seen"])
 

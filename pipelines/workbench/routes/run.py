@@ -59,7 +59,6 @@ def run(request: Request) -> Response:
 
 
 def _cells(bench: Workbench, run: str, tables: Sequence[str]) -> dict[str, dict[str, float]]:
-    """The figures of the page by unit."""
     cells: dict[str, dict[str, float]] = {}
     if "figures" in tables:
         figures = run_table(bench, run, "figures")

@@ -127,7 +127,6 @@ def _table(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
 
 
 def _drawn(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
-    """The unit's rows of a table to draw."""
     rows = _table(bench, state, name) if name in bench.archive.run(state.run).tables() else None
     if rows is None or rows.empty:
         raise WrongUse(
@@ -152,7 +151,6 @@ def history_question(unit: str) -> str:
 
 
 def _parameter(row: dict[str, Any]) -> str:
-    """The name of a coefficient: effect, name and axis."""
     return f"{row['effect']} {row['name']} {row['axis']}"
 
 

@@ -1,7 +1,5 @@
 """An uploaded file: stored in the folder, read by its mapping, imported into the archive."""
 
-from __future__ import annotations
-
 import filecmp
 import os
 import re
@@ -11,21 +9,19 @@ from collections import OrderedDict
 from collections.abc import Mapping as Mapped
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from pipelines.importers.content import Content
 from pipelines.importers.exchange import is_exchange
+from pipelines.importers.files import SourceFile
 from pipelines.importers.limited import ReadingEnded, ReadingLimits, in_reader
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import UploadPage
 from schemas.errors import DataRejected, TumblelineError, WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.importers.content import Content
-    from pipelines.importers.files import SourceFile
 
 FOLDER = "uploads"
 PART = ".part-"

@@ -19,10 +19,6 @@ def _write_first_half(words: list[int], held: list[int] | None, write: WriteWord
     return 4  # server device failure
 
 
-def _write_nothing(words: list[int], held: list[int] | None, write: WriteWords) -> int:
-    return 0
-
-
 def _random_words(fault: Fault, now_us: int, address: int, words: list[int]) -> list[int]:
     """Seeded by time, address and device."""
     rng = np.random.default_rng([now_us, address, fault.device_id])
@@ -45,7 +41,7 @@ add(
         "exceptions_off",
         "A device ignores every write and acknowledges it: its exception responses are switched off (AZ series).",
         ANY,
-        on_write=_write_nothing,
+        on_write=lambda *_: 0,
     ),
     Kind(
         "garbage",

@@ -77,12 +77,10 @@ class ChaosProxy:
             self._once.extend(actions)
 
     def __enter__(self) -> Self:
-        """Starts listening."""
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Closes every connection."""
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
