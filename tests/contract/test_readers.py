@@ -5,7 +5,9 @@ import io
 import struct
 import tomllib
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -244,9 +246,11 @@ def sample(name: str, path: Path, request: pytest.FixtureRequest) -> str:
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of libraries that leave damaged files
 @each(READERS)
 def test_a_reader_reads_its_sample_which_no_other_claims_and_refuses_a_damaged_one(
-    name: str, tmp_path: Path, request
+    name: str, tmp_path: Path, request, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "no-ending"
+    if name == "mdf4":  # the end of a damaged one fails, and its traceback keeps it until a later test
+        monkeypatch.setattr(pytest.importorskip("asammdf.blocks.mdf_v4").MDF4, "__del__", closed)
     group = "" if name in REFUSED else sample(name, path, request)
     if name in REFUSED:
         path.write_bytes(REFUSED[name])
@@ -274,7 +278,13 @@ def test_a_reader_reads_its_sample_which_no_other_claims_and_refuses_a_damaged_o
         assert message.startswith("short")
         assert "\n" not in message
         assert 0 < rows <= 60_000
-    gc.collect()  # objects of libraries that keep a damaged file open end here, and not in the test behind this one
+    gc.collect()  # objects of libraries that keep a damaged file open end here
+
+
+def closed(file: Any) -> None:
+    """Close a file of a library, whatever it lacks."""
+    with suppress(Exception):
+        file.close()
 
 
 def spoilt(data: bytes) -> Iterator[bytes]:
