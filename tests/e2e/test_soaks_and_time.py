@@ -58,6 +58,7 @@ def after_first_soak(told):
     return told[first:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("temperatures", "changes"),
     [

@@ -94,6 +94,7 @@ def test_the_quickest_recipe_passes_and_its_next_lines_can_be_pasted(tmp_path: P
         assert "certificate LN-01/1" in text
 
 
+@pytest.mark.slow
 @each([*zip(RECIPES, cycle(STATIONS), strict=False)], lambda case: " on ".join(map(named, case)))
 def test_a_recipe_can_be_planned_on_one_station_or_is_refused_by_name(case: tuple[Path, Path]) -> None:
     """Those of procedures on the built-in station: tests/e2e/test_pages.py."""

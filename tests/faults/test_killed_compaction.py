@@ -80,6 +80,7 @@ compaction.compact(Archive(sys.argv[1]))
 """
 
 
+@pytest.mark.slow
 def test_killed_at_any_step_leaves_every_file(made: Path, tmp_path: Path) -> None:
     expected = logical(Archive(str(made)))
     killed = 0

@@ -255,6 +255,7 @@ program_run(run, chosen_units(run, ["A1"]), station_of(run), Choice(), report)
 LATER = ("A1: read back", "power cycle", "verify in pose")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["A1: write", *(pytest.param(step, marks=pytest.mark.slow) for step in LATER)])
 def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_written_again(run: Run, step: str) -> None:
     ledger = Ledger(run.archive.root)

@@ -105,6 +105,7 @@ def test_a_point_that_is_off_is_a_bad_point_and_no_effect(seed: int) -> None:
     assert diagnosis.next_hz == diagnosis.alone_hz == (pytest.approx(f[bad]),)
 
 
+@pytest.mark.slow
 def test_a_hidden_low_pass_is_named_beside_a_bad_point(rng: np.random.Generator) -> None:
     f = np.geomspace(5.0, 5000.0, 60)
     b, a = signal.butter(1, 2.0 * np.pi * 9000.0, analog=True)

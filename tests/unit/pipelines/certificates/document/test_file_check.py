@@ -220,6 +220,7 @@ def accepted_alterations(made: Issued, folder: Path, step: int, patch: pytest.Mo
     return len(every), names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step", "least"), [(41, 6), pytest.param(1, 290, marks=pytest.mark.slow)])
 def test_no_altered_text_or_attribute_is_accepted_by_the_archive(
     made: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int, least: int
