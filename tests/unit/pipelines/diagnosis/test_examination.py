@@ -121,6 +121,7 @@ def test_a_unit_without_some_dwells_is_diagnosed_by_those_it_has(rng):
     assert document["recommended"] == ["third_order"]
 
 
+@pytest.mark.slow
 def test_a_unit_without_most_of_its_dwells_is_refused(rng):
     table = lots.lot(rng, units=3, temperatures=(0.0, 50.0))
     count = int((table["unit"] == "U000").sum())

@@ -59,6 +59,7 @@ def test_two_positions_give_half_the_sum_and_half_the_difference(tmp_path):
     assert "cannot be determined from these poses: Kxy, Kxz" in told
 
 
+@pytest.mark.slow
 def test_a_tumble_is_its_fourier_series(tmp_path):
     path, table = tilt_file(tmp_path)
     for name in ("U [V]", "x_V"):
