@@ -103,7 +103,7 @@ def _several_effects(field: Candidates, model: Model, rivals: Sequence[Rival]) -
 
     Jumps of an axis may imitate several effects at once, such as a bias that follows a polynomial of the temperature.
     """
-    sets = [[rival] for rival in rivals if not isinstance(rival.term.effect, Handling)][:_FINALISTS]
+    sets = [[rival] for rival in rivals if rival.rank and not isinstance(rival.term.effect, Handling)][:_FINALISTS]
     for _ in range(_TOGETHER):
         larger = [[*effects, further] for effects in sets for further in _another(field, model, effects)]
         sets = sorted(larger, key=lambda effects: sum(rival.cost for rival in effects))[:1]
