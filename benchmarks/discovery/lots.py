@@ -82,10 +82,12 @@ class Lots:
 
 
 def _hide(dwells: pd.DataFrame, effect: str, size: Array) -> None:
+    """Add an effect to the outputs; the rows of a unit stand together, in order of time, and all units have as many."""
     names, forces = ([f"{what}_{axis}" for axis in "xyz"] for what in ("out", "force"))
-    for (_, own), of_axes in zip(dwells.groupby("unit", sort=False), size, strict=True):
-        force, warm, time = (own[name].to_numpy(dtype=float) for name in (forces, "unit_C", "time_s"))
-        dwells.loc[own.index, names] += of_axes * added(effect, force, warm, time)
+    out, force = (dwells[of].to_numpy(dtype=float).reshape(len(size), -1, 3) for of in (names, forces))
+    warm, time = (dwells[of].to_numpy(dtype=float).reshape(len(size), -1) for of in ("unit_C", "time_s"))
+    more = [each * added(effect, *there) for each, *there in zip(size, force, warm, time, strict=True)]
+    dwells[names] = (out + np.array(more)).reshape(-1, 3)
 
 
 def _scored(dwells: pd.DataFrame, world: World, rng: np.random.Generator) -> LotScores:

@@ -133,12 +133,12 @@ def _deflection(force: Array, hardening: float) -> Array:
 
 def _wander(rng: np.random.Generator, time: Array) -> Array:
     """Wander (n, 3) of three Ornstein-Uhlenbeck processes of unit variance in all."""
-    total = np.zeros((time.size, 3))
+    total, gaps = np.zeros((time.size, 3)), np.diff(time, prepend=time[:1])
     for tau in _TAU_S:
-        state = rng.standard_normal(3)
-        for k in range(time.size):
-            correlation = math.exp(-(time[k] - time[k - 1]) / tau) if k else 1.0
-            state = correlation * state + math.sqrt(1.0 - correlation**2) * rng.standard_normal(3)
+        state, *steps = rng.standard_normal((1 + time.size, 3))
+        kept, new = np.exp(-gaps / tau), np.sqrt(-np.expm1(-2.0 * gaps / tau))
+        for k, step in enumerate(steps):
+            state = kept[k] * state + new[k] * step
             total[k] += state
     return total / math.sqrt(len(_TAU_S))
 
