@@ -84,9 +84,7 @@ class Readings:
         """
         if not self.turned:
             return np.stack([self._nominal(f, o) for f, o in zip(self.force, self.output, strict=True)])
-        return np.stack(
-            [robust_fit(f, o) for f, o in zip(shown_force(self.force, self.axes), self.output, strict=True)]
-        )
+        return robust_fits(shown_force(self.force, self.axes), self.output)
 
     def _nominal(self, force: Array, output: Array) -> Array:
         """Bias and nominal response, (m, 4): 1 for g, 9.80665 for m/s², else the median norm of output over that of force.
@@ -120,8 +118,7 @@ class Readings:
             return self
         # the temperature beside the three forces: one more column of the design
         driven = np.concatenate([shown_force(self.force, self.axes), theta[..., None]], axis=-1)
-        each = zip(driven, self.output, (FAR_G * self.scale).tolist(), strict=True)
-        slope = np.stack([robust_fit(x, y, least=least)[:, 4] for x, y, least in each])
+        slope = robust_fits(driven, self.output, least=FAR_G * self.scale)[..., 4]
         return replace(self, output=self.output - theta[..., None] * slope[:, None, :])
 
     @cached_property
@@ -133,11 +130,8 @@ class Readings:
         warm = self.warm
         if warm is None or not self.turned or not np.isfinite(warm[self.there]).all():
             return self.misfit
-        left = np.empty_like(self.output)
-        force = shown_force(self.force, self.axes)
-        for unit, theta in enumerate(warm - np.nanmean(warm, axis=1, keepdims=True)):
-            fitted = design(force[unit], theta) @ robust_fit(force[unit], self.output[unit], theta).T
-            left[unit] = self.output[unit] - fitted
+        force, theta = shown_force(self.force, self.axes), warm - np.nanmean(warm, axis=1, keepdims=True)
+        left = self.output - design(force, theta) @ np.swapaxes(robust_fits(force, self.output, theta), -1, -2)
         return left / np.where(self.scale > 0.0, self.scale, 1.0)[:, None, None]
 
     @cached_property
@@ -150,40 +144,47 @@ class Readings:
 def design(force: Array, theta: Array | None = None) -> Array:
     """Columns (..., 4) of bias and response for a force (..., 3), g; with a temperature (...,), K, and their slopes, (..., 8)."""
     x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
-    return x if theta is None else np.concatenate([x, theta[:, None] * x], axis=-1)
+    return x if theta is None else np.concatenate([x, theta[..., None] * x], axis=-1)
 
 
-def robust_fit(force: Array, output: Array, theta: Array | None = None, *, least: float = 0.0) -> Array:
-    """Robust bias and response (3, 4), output unit, by least squares reweighted with Tukey's biweight.
+def robust_fits(force: Array, output: Array, theta: Array | None = None, *, least: Array | float = 0.0) -> Array:
+    """Robust bias and response of units (units, 3, 4), output unit, by least squares reweighted with Tukey's biweight.
 
     Dwells are weighted by the norm of their residual over the three axes, so that a wrong pose loses weight on all three.
 
     Parameters
     ----------
-    theta : (n,), temperature above the reference, K; then the temperature slopes are fitted too and appended, (3, 8)
-    least : residual norm, output unit, up to which a dwell has full weight: where many dwells agree closely, dwells at another
-        temperature would otherwise have no weight
+    force, output : (units, n, 3), g and output unit
+    theta : (units, n), temperature above the reference, K; then the temperature slopes are fitted too and appended, (units, 3, 8)
+    least : (units,) or one, residual norm, output unit, up to which a dwell has full weight: where many dwells agree closely,
+        dwells at another temperature would otherwise have no weight
     """
     there = np.isfinite(output).all(axis=-1)
-    x, y = design(force, theta)[there], output[there]
-    weight = np.ones(len(y))
-    coefficients = np.zeros((x.shape[1], output.shape[-1]))
+    x, y = (np.where(there[..., None], values, 0.0) for values in (design(force, theta), output))
+    weight, floor = there.astype(float), np.broadcast_to(least, len(y))
+    coefficients = np.zeros((len(y), x.shape[-1], y.shape[-1]))
+    halves = (there.sum(axis=-1, keepdims=True) + np.array([-1, 0])) // 2  # places of the median among what is there
+    left = np.arange(len(y))  # units that are not done
     for turn in range(_ROUNDS):
-        coefficients = np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0].astype(np.float64)
-        size = np.linalg.norm(y - x @ coefficients, axis=1)
-        middle = float(np.median(size))
-        if middle <= 0.0:
-            break
+        q, r = np.linalg.qr(x[left] * weight[left, :, None])
+        coefficients[left] = np.linalg.pinv(r, rcond=1e-9) @ (np.swapaxes(q, -1, -2) @ (y * weight[..., None])[left])
+        size = np.linalg.norm(y[left] - x[left] @ coefficients[left], axis=-1)
+        ordered = np.sort(np.where(there[left], size, np.inf), axis=-1)
+        middle = 0.5 * (np.take_along_axis(ordered, halves[left], axis=-1).sum(axis=-1, keepdims=True))
+        going = middle[:, 0] > 0.0
+        left, size, middle = left[going], size[going], middle[going]
         # least absolute deviations first: started from least squares, the biweight could converge between outliers
-        u = size / (_TUKEY * max(1.5 * middle, least))
-        weight = (
-            np.sqrt(1.0 / np.maximum(size, max(0.1 * middle, least)))
+        u = size / (_TUKEY * np.maximum(1.5 * middle, floor[left, None]))
+        weighted = (
+            np.sqrt(1.0 / np.maximum(size, np.maximum(0.1 * middle, floor[left, None])))
             if turn < 5
             else np.where(u < 1.0, 1.0 - u**2, 0.0)
         )
-        if np.count_nonzero(weight) <= x.shape[1]:
+        weight[left] = weighted * there[left]
+        left = left[np.count_nonzero(weight[left], axis=-1) > x.shape[-1]]
+        if not left.size:
             break
-    return coefficients.T
+    return np.swapaxes(coefficients, -1, -2)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.data_errors.readings import Readings, design, robust_fit
+from inertial.data_errors.readings import Readings, design, robust_fits
 from inertial.effects.base import others
 from inertial.estimation.problem import Lot
 from inertial.fits.linear import force_along_axes, of_every_axis, own_terms
@@ -313,15 +313,17 @@ def _felt_with_temperature(measurement: Measured, response: Array, scale: Array)
     axes = readings.axes
     run = np.zeros((*readings.output.shape[:2], 3))
     force = np.broadcast_to(state.force, run.shape)
-    shown = shown_force(force, axes)
-    for unit, theta in enumerate(np.broadcast_to(state.theta, run.shape[:2])):
-        if np.linalg.matrix_rank(design(shown[unit], theta)[readings.there[unit]]) < _columns(shown):
-            continue  # the poses of the soaks do not determine the axes and their gain's run
-        coefficients = robust_fit(shown[unit], readings.output[unit], theta)
-        felt[unit] = force_along_axes(of_every_axis(coefficients[:, 1:4], axes), force[unit])
-        at_reference = own_terms(coefficients[:, 1:4], axes)
-        gain = own_terms(coefficients[:, 5:], axes) / np.where(at_reference == 0.0, 1.0, at_reference)
-        run[unit][:, axes] = theta[:, None] * (coefficients[:, 4] / scale[unit] + gain * felt[unit][:, axes])
+    shown, theta = shown_force(force, axes), np.broadcast_to(state.theta, run.shape[:2])
+    rows = np.where(readings.there[..., None], design(shown, theta), 0.0)
+    # elsewhere the poses of the soaks do not determine the axes and their gain's run
+    told = np.flatnonzero(np.linalg.matrix_rank(rows) >= _columns(shown))
+    coefficients = robust_fits(shown[told], readings.output[told], theta[told])
+    for unit, of_unit in zip(told, coefficients, strict=True):
+        felt[unit] = force_along_axes(of_every_axis(of_unit[:, 1:4], axes), force[unit])
+        at_reference = own_terms(of_unit[:, 1:4], axes)
+        gain = own_terms(of_unit[:, 5:], axes) / np.where(at_reference == 0.0, 1.0, at_reference)
+        along = of_unit[:, 4] / scale[unit] + gain * felt[unit][:, axes]
+        run[unit][:, axes] = theta[unit][:, None] * along
     return felt, run
 
 
