@@ -57,7 +57,9 @@ class DiscoveryArchive:
     def infos(self) -> list[Any]:
         """Finished runs with dwells in the order of their start; of the re-runs only the fits of imports."""
         stages = ({"reduce", "import"}, {"import"})
-        return [info for info in self.archive.runs() if info.finished and stages[bool(info.rerun_of)] & set(info.stages)]
+        return [
+            info for info in self.archive.runs() if info.finished and stages[bool(info.rerun_of)] & set(info.stages)
+        ]
 
     @cached_property
     def _imports(self) -> dict[str, str]:

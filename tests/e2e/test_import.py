@@ -290,7 +290,7 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     frame[["ax", "ay", "az"]] /= 16384.0  # the advice, followed, leads to a fit
     imported(written(frame), *mapped, "--unit-of", "output=g", "--set", "block_s=10")
     text_of(*fit)
-    pooled = document_of("discover", status=None)["pooled"]  # the lot counts by its fit, not as an import without a model
+    pooled = document_of("discover", status=None)["pooled"]  # the lot counts by its fit
     assert pooled["lots"] == 1
     assert not any(row["run"] == document_of("list")["runs"][-2]["id"] for row in pooled["left_out"])
 
