@@ -10,7 +10,17 @@ import pandas as pd
 
 from inertial import change_of_level
 from inertial.arrays import Array
-from pipelines.importers import clocks, files, guesses, sample_faults, sources, stretches, unit_check, values
+from pipelines.importers import (
+    clocks,
+    files,
+    guesses,
+    named_columns,
+    sample_faults,
+    sources,
+    stretches,
+    unit_check,
+    values,
+)
 from pipelines.importers.content import Content
 from pipelines.importers.exchange import is_exchange
 from pipelines.importers.guesses import Guesses, measurable
@@ -125,7 +135,13 @@ def of_content(
     if len(paths) == 1 and is_exchange(content.table.columns):
         guessed = guesses.guesses_of_dwells(content.table)
         return Recognition(tuple(paths), content, source, guessed, is_exchange=True)
-    guessed = guesses.guesses(content)
+    serial = named_columns.serials(content.table)
+    by_unit = content if not serial else replace(content, table=_by_unit(content.table, serial))
+    guessed = guesses.guesses(by_unit)
+    content = by_unit if guessed.dwells else content
+    if serial:  # a stop is of one unit
+        units = content.table[serial].astype(str).to_numpy(dtype=object)
+        breaks = [*breaks, *(np.flatnonzero(units[1:] != units[:-1]) + 1).tolist()]
     time, open_ = _time(content, guessed)
     output = _output(content, guessed)
     finite = np.ones(len(content.table), dtype=bool) if output is None else np.isfinite(output).all(axis=1)
@@ -163,6 +179,11 @@ def of_content(
         tuple(paths), content, source, guessed, False, clock, samples, gaps, _rate(clock), stops, faults, tuple(open_), keys,
         labels, joints,
     )  # fmt: skip
+
+
+def _by_unit(table: pd.DataFrame, serial: str) -> pd.DataFrame:
+    """The rows, one unit after the other: a clock and numbers of dwells are those of one unit, however the rows are mixed."""
+    return table.loc[table.groupby(serial, sort=False, dropna=False).ngroup().sort_values(kind="stable").index]
 
 
 _OUTPUT_UNIT = "the unit of the output: --unit-of output=g|mg|m/s^2|V|mV|LSB"
