@@ -195,6 +195,6 @@ def _missing(document: ImproveDocument) -> None:
         say(f"  {text}", style="yellow")
     for row in document["ladder"]:
         known = row["heldout_ug"] is not None and math.isfinite(row["heldout_ug"])
-        held = "" if not known else f", on dwells left out {row['heldout_ug']:.0f} µg"
+        held = "" if not known else f", {row['heldout_ug']:.0f} µg of dwells predicted by a fit without them"
         added = f" with {', '.join(row['added'])}" if row["added"] else ""
-        say(f"  error{added}: fitted {row['fitted_ug']:.0f} µg{held}; noise {row['noise_ug']:.0f} µg")
+        say(f"  rms error{added}: {row['fitted_ug']:.0f} µg of the fitted dwells{held}; noise {row['noise_ug']:.0f} µg")
