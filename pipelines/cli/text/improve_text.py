@@ -122,6 +122,8 @@ def next_of_recording(
 ) -> list[str]:
     """The commands to give next: the fit of a changed model; without faulty dwells, else the coefficients, else the diagnosis.
 
+    A fault from one dwell on, or of all dwells of a unit, leaves none to go on with: the diagnosis shows where it begins.
+
     model, repeated : options of ``improve``: the model that was judged; the file to write and the author
     """
     data = JudgedData(recording["run"], "", given.fresh, given.fresh_history, given=given)
