@@ -71,6 +71,8 @@ def test_a_stopped_job_ends_its_process_and_the_next_one_runs_is_shared_and_fail
     ended(table, first.id)
     assert table.get(job.id).state == "stopped"
     assert table.result("plan", request) is None
+    table.forget("plan", request)  # what it made was removed
+    assert table.known("plan", request) is None
     table.close()
     path = tmp_path / "jobs.json"  # what a dead server was at is interrupted and never running
     running = {"id": "a", "kind": "plan", "title": "t", "state": "running"}
