@@ -65,6 +65,30 @@ class UploadReading:
     problem: str = ""
 
 
+_FIELD_OF = {
+    r"--unit-of output=([^\s;,…]+)": r"the field 'Unit of the output' (\1)",
+    r"--unit-of output(=…)?": "the field 'Unit of the output'",
+    r"--unit-of (time|temperature)=([^\s;,…]+)": r"the field 'Unit of \1' (\2)",
+    r"--unit-of (time|temperature)(=…)?": r"the field 'Unit of \1'",
+    r"--map\b( [a-z_]+=[^\s;,]*)?": "a field of 'Meaning of the columns'",
+    r"--rate( HZ)?\b": "the field 'Rate'",
+    r"--units( SN)?\b": "the field 'Serial number'",
+    r"--set local_gravity_m_s2(=[^\s,;]*)?": "the field 'Local gravity'",
+    r"--set poses(=[^\s;]*)?": "the field 'Faces'",
+    r"--set rows(=dwells)?": "the field 'One row is'",
+    r"--fit( [a-z]+)?\b": r"the field 'Fit'",
+}
+"""Options of the command ``import``, and what the page offers in their place."""
+
+
+def in_fields(text: str) -> str:
+    """A message on an import with the fields of the page in place of options; what the page lacks is of the command line."""
+    for words, offered in _FIELD_OF.items():
+        text = re.sub(words, offered, text)
+    lacking = "; what begins with -- is an option of 'tumbleline import'"
+    return text + (lacking if " --" in text and "tumbleline" not in text else "")
+
+
 _looking = threading.Lock()
 _looks: OrderedDict[tuple[str, int, int], UploadReading | TumblelineError] = OrderedDict()
 
