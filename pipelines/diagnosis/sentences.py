@@ -66,7 +66,7 @@ def plain_verdict(judged: Mapping[str, Any]) -> str:
 
 def _figures(judged: Mapping[str, Any]) -> str:
     units = judged["units"]
-    left = f"residual {short(judged['rms_ug'])} µg rms over {units} unit{'s' if units != 1 else ''}"
+    left = f"residual {short(judged['rms_ug'])} µg rms over {number_of(units, 'unit')}"
     return f"{left}; noise of the measurement {short(judged['floor_ug'])} µg rms (p {equal(judged['p_value'])})"
 
 
@@ -177,7 +177,7 @@ def tails_left_out(document: DiagnosisDocument) -> str:
     named = tails[:NAMED_DWELLS]
     names = ", ".join(f"{d['unit']} dwell {d['dwell']} ({d['deviations']:.1f})" for d in named)
     return (
-        f"{len(tails)} dwell{'s' if len(tails) != 1 else ''} left out (standard deviations): {names}"
+        f"{number_of(len(tails), 'dwell')} left out (standard deviations): {names}"
         f"{' …' if len(tails) > len(named) else ''}; the tails of the noise of this run may reach as far"
     )
 
