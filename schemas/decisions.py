@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite, isnan, log
+from math import isnan, log
 from statistics import NormalDist
 from typing import Literal, Protocol
 
@@ -98,15 +98,13 @@ def digits_beside(value: float, limit: float, digits: int = 3) -> int:
 
     They reach to the last digit of the limit; of a limit itself (``value`` equal to it) they are all its digits.
     """
-    text = f"{limit:.10g}"
-    step = 10.0 ** -len(text.partition(".")[2].partition("e")[0]) if isfinite(limit) else inf
-    while digits < 15:
-        shown = float(f"{value:.{digits}g}")
+    step = 10.0 ** -len(f"{limit:.10g}".partition(".")[2].partition("e")[0])
+    for count in range(digits, 16):
+        shown = float(f"{value:.{count}g}")
         hidden = (abs(shown) - limit) * (abs(value) - limit) <= 0.0 and abs(value) != limit
-        if not (abs(shown - value) > 0.5 * step or hidden):
-            break
-        digits += 1
-    return digits
+        if not (abs(shown - value) > 0.5 * step or hidden):  # of a value or limit that is not finite at once
+            return count
+    return 15
 
 
 def beside_limit(value: float, uncertainty: float, limit: float, unit: str, side: str = "") -> str:

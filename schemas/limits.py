@@ -122,11 +122,10 @@ def parse_limits(text: str, source: str, units: Mapping[str, str]) -> Limits:
     """The limits of a file, or :class:`RecipeInvalid` naming the key and what is needed; ``units``: of every known figure."""
     limits = parse_as(Limits, text, source, context=units)
     if limits.pfa_max is not None and limits.rule != "allowed_pfa":  # archived limits are read with it
-        raise RecipeInvalid(
-            f"{source}: key 'pfa_max': found {limits.pfa_max:g} beside rule = '{limits.rule}', which does not use it; write "
-            "rule = 'allowed_pfa', or delete pfa_max",
-            key="pfa_max",
+        found = (
+            f"{source}: key 'pfa_max': found {limits.pfa_max:g} beside rule = '{limits.rule}', which does not use it"
         )
+        raise RecipeInvalid(f"{found}; write rule = 'allowed_pfa', or delete pfa_max", key="pfa_max")
     return limits
 
 

@@ -136,12 +136,13 @@ def of_content(
         guessed = guesses.guesses_of_dwells(content.table)
         return Recognition(tuple(paths), content, source, guessed, is_exchange=True)
     serial = named_columns.serials(content.table)
-    by_unit = content if not serial else replace(content, table=_by_unit(content.table, serial))
+    by_unit = content
+    if serial:  # a clock and numbers of dwells are those of one unit, however the rows are mixed, and so is a stop
+        number = content.table.groupby(serial, sort=False).ngroup()
+        by_unit = replace(content, table=content.table.loc[number.sort_values(kind="stable").index])
+        breaks = [*breaks, *(np.flatnonzero(np.diff(number)) + 1).tolist()]
     guessed = guesses.guesses(by_unit)
     content = by_unit if guessed.dwells else content
-    if serial:  # a stop is of one unit
-        units = content.table[serial].astype(str).to_numpy(dtype=object)
-        breaks = [*breaks, *(np.flatnonzero(units[1:] != units[:-1]) + 1).tolist()]
     time, open_ = _time(content, guessed)
     output = _output(content, guessed)
     finite = np.ones(len(content.table), dtype=bool) if output is None else np.isfinite(output).all(axis=1)
@@ -179,11 +180,6 @@ def of_content(
         tuple(paths), content, source, guessed, False, clock, samples, gaps, _rate(clock), stops, faults, tuple(open_), keys,
         labels, joints,
     )  # fmt: skip
-
-
-def _by_unit(table: pd.DataFrame, serial: str) -> pd.DataFrame:
-    """The rows, one unit after the other: a clock and numbers of dwells are those of one unit, however the rows are mixed."""
-    return table.loc[table.groupby(serial, sort=False, dropna=False).ngroup().sort_values(kind="stable").index]
 
 
 _OUTPUT_UNIT = "the unit of the output: --unit-of output=g|mg|m/s^2|V|mV|LSB"

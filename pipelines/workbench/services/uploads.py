@@ -66,25 +66,17 @@ class UploadReading:
 
 
 _FIELD_OF = {
-    r"--unit-of output=([^\s;,…]+)": r"the field 'Unit of the output' (\1)",
-    r"--unit-of output(=…)?": "the field 'Unit of the output'",
-    r"--unit-of (time|temperature)=([^\s;,…]+)": r"the field 'Unit of \1' (\2)",
-    r"--unit-of (time|temperature)(=…)?": r"the field 'Unit of \1'",
-    r"--map\b( [a-z_]+=[^\s;,]*)?": "a field of 'Meaning of the columns'",
-    r"--rate( HZ)?\b": "the field 'Rate'",
-    r"--units( SN)?\b": "the field 'Serial number'",
-    r"--set local_gravity_m_s2(=[^\s,;]*)?": "the field 'Local gravity'",
-    r"--set poses(=[^\s;]*)?": "the field 'Faces'",
-    r"--set rows(=dwells)?": "the field 'One row is'",
-    r"--fit( [a-z]+)?\b": r"the field 'Fit'",
-}
-"""Options of the command ``import``, and what the page offers in their place."""
+    "unit-of output": "Unit of the output", "unit-of time": "Unit of time", "unit-of temperature": "Unit of temperature",
+    "map": "Meaning of the columns", "rate": "Rate", "units": "Serial number", "set local_gravity_m_s2": "Local gravity",
+    "set poses": "Faces", "set rows": "One row is", "fit": "Fit",
+}  # fmt: skip
+"""The fields of the page in place of options of the command ``import``."""
+_OPTION = re.compile(rf"--({'|'.join(_FIELD_OF)})\b(?:=(?!…)([^\s;,]+)|=…| HZ| SN| [a-z_]+=[^\s;,]*)?")
 
 
 def in_fields(text: str) -> str:
     """A message on an import with the fields of the page in place of options; what the page lacks is of the command line."""
-    for words, offered in _FIELD_OF.items():
-        text = re.sub(words, offered, text)
+    text = _OPTION.sub(lambda m: f"the field '{_FIELD_OF[m[1]]}'" + (f" ({m[2]})" if m[2] else ""), text)
     lacking = "; what begins with -- is an option of 'tumbleline import'"
     return text + (lacking if " --" in text and "tumbleline" not in text else "")
 
