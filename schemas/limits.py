@@ -48,7 +48,7 @@ class Limit(Grown):
     @property
     def text(self) -> str:
         """The limit for people, without its unit."""
-        return f"at least {self.min:.4g}" if self.min is not None else f"{self.max:.4g}"
+        return f"at least {self.min:.10g}" if self.min is not None else f"{self.max:.10g}"
 
 
 class Limits(Grown):
