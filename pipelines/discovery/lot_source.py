@@ -65,8 +65,8 @@ class DiscoveryArchive:
     def _imports(self) -> dict[str, str]:
         """For each fit of an import the run that imported its dwells; it is one lot with all its fits."""
         first: dict[str, str] = {}
-        for info in filter(lambda info: info.rerun_of, self.infos):
-            first[info.id] = first.get(info.rerun_of, info.rerun_of)
+        for run, source in ((info.id, str(info.rerun_of)) for info in self.infos if info.rerun_of):
+            first[run] = first.get(source, source)
         return first
 
     @cached_property

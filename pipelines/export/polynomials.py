@@ -265,13 +265,13 @@ def _refuse_unknown(serials: tuple[str, ...], units: Collection[str]) -> None:
 def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> None:
     _refuse_unknown(serials, grades.index.tolist())
     for unit in serials:
-        outcome, reasons = grades.loc[unit, "outcome"], grades.loc[unit, "reasons"]
+        outcome, reasons = grades.loc[unit, "outcome"], plain_reason(str(grades.loc[unit, "reasons"]))
         if outcome == "refused":
             raise WrongUse(
-                f"the data of unit {unit} were refused ({plain_reason(reasons)}), so it has no coefficients; measure it again"
+                f"the data of unit {unit} were refused ({reasons}), so it has no coefficients; measure it again"
             )
         if outcome == "fail" and not failed:
-            raise WrongUse(f"unit {unit} failed ({plain_reason(reasons)}); --include failed takes its coefficients")
+            raise WrongUse(f"unit {unit} failed ({reasons}); --include failed takes its coefficients")
 
 
 def effects_left_out(calibration: Calibration) -> tuple[str, ...]:
