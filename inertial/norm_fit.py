@@ -13,6 +13,7 @@ import numpy as np
 from inertial import design
 from inertial.arrays import Array, Flags, Index
 from inertial.correction import correct
+from inertial.counts import number_of
 from inertial.design import Values
 from inertial.errors import NotIdentified
 from inertial.fits.descent import descended
@@ -207,8 +208,8 @@ class _Work:
         dof = count - free - more.shape[-1]
         if np.any(dof < 1):
             raise NotIdentified(
-                f"fit: {int(count.min())} dwells, more than {free + more.shape[-1]} are needed for this model; add poses, or "
-                "leave effects out"
+                f"fit: {number_of(int(count.min()), 'dwell')}, more than {free + more.shape[-1]} are needed for this model; add "
+                "poses, or leave effects out"
             )
         left, force = self.left(theta), self.force(theta)
         white_left = self.white(left[..., None])[..., 0]

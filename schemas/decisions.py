@@ -79,9 +79,7 @@ class Decision:
     def sentence(self) -> str:
         """The decision for people: figure, value, uncertainty, limit and margin."""
         unit = "" if self.unit == "1" else f" {self.unit}"
-        spread = f" ± {float(f'{self.uncertainty:.2g}'):g}" if self.uncertainty > 0.0 else ""
-        side = "at least " if self.least else ""
-        what = f"{float(f'{self.value:.3g}'):g}{spread}{unit}, limit {side}{self.limit:.4g}{unit}"
+        what = beside_limit(self.value, self.uncertainty, self.limit, unit, "at least " if self.least else "")
         if self.outcome.startswith("conditional"):
             risk = f"probability of {'falling below' if self.least else 'exceeding'} it {100.0 * self.risk:.2g} %"
             beyond = "below" if self.least else "above"
@@ -93,6 +91,27 @@ class Decision:
                 remedy = "the uncertainty exceeds the limit, lower its largest contribution"
             return f"{self.figure} not accepted: {where}, {what}, {risk}: {remedy}"
         return f"{self.figure} {self.outcome}: {what}, margin {self.margin:.3g}{unit}"
+
+
+def digits_beside(value: float, limit: float, digits: int = 3) -> int:
+    """Significant digits with which a figure shows on which side of its limit it lies.
+
+    They reach to the last digit of the limit; of a limit itself (``value`` equal to it) they are all its digits.
+    """
+    step = 10.0 ** -len(f"{limit:.10g}".partition(".")[2].partition("e")[0])
+    for count in range(digits, 16):
+        shown = float(f"{value:.{count}g}")
+        hidden = (abs(shown) - limit) * (abs(value) - limit) <= 0.0 and abs(value) != limit
+        if not (abs(shown - value) > 0.5 * step or hidden):  # of a value or limit that is not finite at once
+            return count
+    return 15
+
+
+def beside_limit(value: float, uncertainty: float, limit: float, unit: str, side: str = "") -> str:
+    """A figure with its uncertainty and its limit, in so many digits that the decision shows."""
+    shown = float(f"{value:.{digits_beside(value, limit)}g}")
+    spread = f" ± {float(f'{uncertainty:.2g}'):g}" if uncertainty > 0.0 else ""
+    return f"{shown:.15g}{spread}{unit}, limit {side}{limit:.10g}{unit}"
 
 
 def decide(

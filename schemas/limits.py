@@ -48,7 +48,7 @@ class Limit(Grown):
     @property
     def text(self) -> str:
         """The limit for people, without its unit."""
-        return f"at least {self.min:.4g}" if self.min is not None else f"{self.max:.4g}"
+        return f"at least {self.min:.10g}" if self.min is not None else f"{self.max:.10g}"
 
 
 class Limits(Grown):
@@ -120,7 +120,13 @@ def limits_of(document: Mapping[str, Any], units: Mapping[str, str]) -> Limits:
 
 def parse_limits(text: str, source: str, units: Mapping[str, str]) -> Limits:
     """The limits of a file, or :class:`RecipeInvalid` naming the key and what is needed; ``units``: of every known figure."""
-    return parse_as(Limits, text, source, context=units)
+    limits = parse_as(Limits, text, source, context=units)
+    if limits.pfa_max is not None and limits.rule != "allowed_pfa":  # archived limits are read with it
+        found = (
+            f"{source}: key 'pfa_max': found {limits.pfa_max:g} beside rule = '{limits.rule}', which does not use it"
+        )
+        raise RecipeInvalid(f"{found}; write rule = 'allowed_pfa', or delete pfa_max", key="pfa_max")
+    return limits
 
 
 def unknown_limits(name: str, known: list[str]) -> RecipeInvalid:

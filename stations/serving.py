@@ -117,10 +117,17 @@ def _listening(plant: "Plant", host: str, port: int, stack: ExitStack) -> "Plant
                 server = servers.enter_context(PlantServer(plant, host, begin))
                 for number, device_id in enumerate(plant.line_devices, server.port + 1):
                     servers.enter_context(serve_lines(plant, device_id, host, number))
-            except StationRefused:
-                if port != 0 or attempt == TRIES - 1:
-                    raise
-                continue
+            except (StationRefused, OverflowError) as problem:  # there is no port above 65535
+                if port == 0 and attempt < TRIES - 1:
+                    continue
+                last = begin + len(plant.line_devices)
+                ports = (
+                    f"port {begin}"
+                    if last == begin
+                    else f"ports {begin} (registers) to {last} (one for each text protocol)"
+                )
+                found = str(problem).partition(",")[0].rstrip(".")
+                raise StationRefused(f"{found}, free {ports} are needed; give another --port, or 0 for any") from None
             stack.enter_context(servers.pop_all())
             return server
     raise StationRefused(f"simulated station: {host} has no free port, one is needed; end other programs")

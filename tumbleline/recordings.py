@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import pandas as pd
 
+from inertial.counts import number_of
 from pipelines.archive import Archive, Run
 from tumbleline.pictures import Picture, as_html, as_text
 
@@ -82,7 +83,7 @@ class Recording:
         return Picture(Chart(title, (Plot(title, PlotAxis("dwell"), PlotAxis(f"output / {unit}"), traces),)))
 
     def _lines(self) -> list[str]:
-        counted = f"{len(self.dwells)} dwells of {len(self.units)} unit{'s' if len(self.units) != 1 else ''}"
+        counted = f"{number_of(len(self.dwells), 'dwell')} of {number_of(len(self.units), 'unit')}"
         return [f"{counted}; run {self.run.id}", *self.told, *([self.command] if self.command else [])]
 
     def _repr_html_(self) -> str:

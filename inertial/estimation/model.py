@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from inertial.arrays import Array
+from inertial.counts import number_of
 from inertial.distributions import chi2_quantile
 from inertial.errors import NotIdentified
 from inertial.estimation.bases import orthonormal
@@ -363,6 +364,6 @@ def refuse_without_freedom(model: Model) -> None:
     if model.even.dof < 1:
         count, series = model.problem.count, model.problem.blocks
         raise NotIdentified(
-            f"model: {count // series} dwells a unit leave no degree of freedom to judge the model, more dwells than its "
-            "coefficients on an axis are needed; measure more poses or repeats, or judge a smaller model"
+            f"model: {number_of(count // series, 'dwell')} a unit and no degree of freedom to judge the model, more dwells than "
+            "its coefficients on an axis are needed; measure more poses or repeats, or judge a smaller model"
         )

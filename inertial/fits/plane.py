@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.arrays import Array
+from inertial.counts import number_of
 from inertial.distributions import f_tail
 from inertial.errors import NotIdentified
 from inertial.fits.descent import descended
@@ -223,7 +224,7 @@ def _harmonics(series: _Series, angle: Array, orders: Sequence[int]) -> float:
 def _refuse_few(dwells: int, coefficients: int) -> None:
     if dwells <= coefficients:
         raise NotIdentified(
-            f"plane: {dwells} dwells, more than {coefficients} are needed for the axes in the plane; add poses"
+            f"plane: {number_of(dwells, 'dwell')}, more than {coefficients} are needed for the axes in the plane; add poses"
         )
 
 

@@ -7,6 +7,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from inertial.arrays import Array
+from inertial.counts import number_of
 from inertial.distributions import chi2_tail
 from inertial.errors import NotIdentified
 from inertial.probability import passes
@@ -64,7 +65,7 @@ def fit_axis_polynomial(
     count, unknowns = columns.shape[-2:]
     if count <= unknowns:
         raise NotIdentified(
-            f"polynomial: {count} dwells, more than {unknowns} are needed for degree {degree}; add poses"
+            f"polynomial: {number_of(count, 'dwell')}, more than {unknowns} are needed for degree {degree}; add poses"
         )
     size = np.sqrt(np.einsum("...np,...np->...p", columns, columns))
     unit = columns / np.where(size > 0.0, size, 1.0)[..., None, :]

@@ -36,6 +36,7 @@ from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from pipelines.tables.dwells import LotTables
 from pipelines.tables.summaries import summarised
+from schemas.decisions import beside_limit
 from schemas.errors import TumblelineError
 from schemas.limits import Limits
 from schemas.recipe import FEWEST_SAMPLES
@@ -240,7 +241,4 @@ def _failed(figures: pd.DataFrame) -> Iterator[tuple[str, str]]:
     failed = figures[(figures["outcome"] == "fail") & figures["figure"].isin(list(OF_COEFFICIENTS))]
     for row in failed.to_dict("records"):
         unit = "" if row["unit_text"] == "1" else f" {row['unit_text']}"
-        yield (
-            str(row["unit"]),
-            f"{row['figure']} {row['value']:.4g} ± {row['uncertainty']:.2g}{unit}, limit {row['limit']:.4g}{unit}",
-        )
+        yield str(row["unit"]), f"{row['figure']} {beside_limit(row['value'], row['uncertainty'], row['limit'], unit)}"

@@ -98,4 +98,4 @@ def _print_imported(document: dict[str, Any]) -> None:
     for unit in document["units"]:
         reasons = f" ({plain_reason(unit['reasons'])})" if unit["reasons"] else ""
         say(f"  {unit['unit']}: {unit['outcome']}, grade {unit['grade']}{reasons}")
-    print_verdict_of_fit(document["adequate"], "this model does not describe these data")
+    print_verdict_of_fit(document["adequate"], "this model does not describe these data", document["faulty"])

@@ -96,8 +96,9 @@ def _print(rows: list[VersionDocument], name: str, removes: Callable[[str], str]
         if row["text"]:
             say(f"version {row['version']}: {row['text']}")
     say(
-        "cross-validated: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, the bias change "
-        "of each unit included · assumed noise: of the fit of each version, missing effects included",
+        "fitted: dwells of the fit · cross-validated: dwells predicted by a fit without them, the worst of poses, soaks and "
+        "stretches of time · fresh run: coefficients unchanged, the bias change of each unit included · assumed noise: of the "
+        "fit of each version, missing effects included",
         style="dim",
     )
     warn(dict.fromkeys(text for row in rows for text in row["warnings"]))

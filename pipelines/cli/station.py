@@ -164,7 +164,9 @@ SERVING = {
 def serve(
     station: options.StationOption = None,
     host: Annotated[str, option("--host", "Interface to listen on.")] = "127.0.0.1",
-    port: Annotated[int, option("--port", "TCP port; 0: any free port.", min=0, max=65535)] = 5020,
+    port: Annotated[
+        int, option("--port", "First TCP port; each text protocol needs the next; 0: any.", min=0, max=65535)
+    ] = 5020,
     speed: Annotated[
         float, option("--speed", "Simulated seconds per second of real time.", min=0.001, max=1000.0)
     ] = 1.0,

@@ -7,6 +7,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from inertial.arrays import Array
+from inertial.counts import number_of
 from inertial.fits.faces import Faces, faces, ferraris
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.uncertainty.rounding import equal
@@ -150,8 +151,8 @@ def _by_face(dwells: pd.DataFrame, mapping: Mapping) -> tuple[Array, Array, Arra
     missing = [face for face in FACES if face not in faces_there]
     if missing or len(dwells) != len(FACES):
         raise DataRejected(
-            f"import: {len(dwells)} dwells, faces {', '.join(missing) or 'none'} missing; each of {', '.join(FACES)} is needed "
-            "once; name them with --set poses=LABEL=+x,…"
+            f"import: {number_of(len(dwells), 'dwell')}, faces {', '.join(missing) or 'none'} missing; each of "
+            f"{', '.join(FACES)} is needed once; name them with --set poses=LABEL=+x,…"
         )
     means = dwells[list(OUTPUT_COLUMNS)].to_numpy(dtype=np.float64)
     up, down = (means[[faces_there[f"{sign}{axis}"] for axis in AXES]] for sign in "+-")

@@ -9,7 +9,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from inertial.arrays import Array
-from inertial.counts import degrees_of_freedom
+from inertial.counts import degrees_of_freedom, number_of
 from inertial.fits.norm_noise import RUN_PER_K
 from inertial.state import T_REFERENCE
 from inertial.uncertainty.rounding import equal, rounded
@@ -268,7 +268,7 @@ def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
         )
     if method == "norm" and data.dwells is not None and not mapping.poses and len(data.dwells) <= _NORM_NEEDS:
         raise DataRejected(
-            f"import: {len(data.dwells)} dwells of unknown orientation, more than {_NORM_NEEDS} are needed for --fit norm; add "
-            "positions; or, if faces were up, name them with --set poses=LABEL=+x,LABEL=-x,… and give --fit faces"
+            f"import: {number_of(len(data.dwells), 'dwell')} of unknown orientation, more than {_NORM_NEEDS} are needed for "
+            "--fit norm; add positions; or, if faces were up, name them with --set poses=LABEL=+x,LABEL=-x,… and give --fit faces"
         )
     return METHODS[method](data, mapping)

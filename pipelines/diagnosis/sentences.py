@@ -66,7 +66,7 @@ def plain_verdict(judged: Mapping[str, Any]) -> str:
 
 def _figures(judged: Mapping[str, Any]) -> str:
     units = judged["units"]
-    left = f"residual {short(judged['rms_ug'])} µg rms over {units} unit{'s' if units != 1 else ''}"
+    left = f"residual {short(judged['rms_ug'])} µg rms over {number_of(units, 'unit')}"
     return f"{left}; noise of the measurement {short(judged['floor_ug'])} µg rms (p {equal(judged['p_value'])})"
 
 
@@ -177,7 +177,7 @@ def tails_left_out(document: DiagnosisDocument) -> str:
     named = tails[:NAMED_DWELLS]
     names = ", ".join(f"{d['unit']} dwell {d['dwell']} ({d['deviations']:.1f})" for d in named)
     return (
-        f"{len(tails)} dwell{'s' if len(tails) != 1 else ''} left out (standard deviations): {names}"
+        f"{number_of(len(tails), 'dwell')} left out (standard deviations): {names}"
         f"{' …' if len(tails) > len(named) else ''}; the tails of the noise of this run may reach as far"
     )
 
@@ -201,7 +201,7 @@ def why_recommended(document: DiagnosisDocument) -> list[str]:
         if group["scope"] == "sensor or station":
             lines.append(
                 f"{' or '.join(group['effects'])} can be of the sensors or of the station (table, fixture, reference): turn the "
-                f"units in their seats, or measure them on another station.{_without_angles(document)}"
+                f"units in their seats, or measure them on another station.{_untried(document, *_ANGLES)}"
             )
         name, before, after = (added or group["effects"])[0], group.get("heldout_before_ug"), group["heldout_after_ug"]
         if after is None or before is None:
@@ -229,8 +229,8 @@ def unexplained_text(document: DiagnosisDocument) -> str:
     if not unexplained:
         return ""
     shape = "" if unexplained.get("period_s") else f" as a {unexplained['shape']}"
-    of_table = _without_angles(document) if unexplained["driver"] == "pose" else ""
-    return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])}).{of_table}"
+    untried = _untried(document, *(_ANGLES if unexplained["driver"] == "pose" else _TEMPERATURE))
+    return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])}).{untried}"
 
 
 def suspected_text(document: DiagnosisDocument) -> str:
@@ -251,13 +251,19 @@ def not_recorded(reason: str) -> str:
     return "" if match is None else match[1]
 
 
-def _without_angles(document: DiagnosisDocument) -> str:
-    """A sentence on effects that could not be tried without the angles of the table; empty where they are recorded."""
+_ANGLES = ("outer_deg", "the table's angles", "record outer_deg and inner_deg")
+_TEMPERATURE = ("unit_C", "temperatures", "record them in the column unit_C, in °C")
+_MOST_UNTRIED = 4
+
+
+def _untried(document: DiagnosisDocument, column: str, what: str, remedy: str) -> str:
+    """A sentence on effects that could not be tried without a column; empty where it is recorded."""
     reasons = document.get("reasons", {})
-    names = [name for name in document["unseen"] if not_recorded(reasons.get(name, "")) == "outer_deg"]
+    names = [name for name in document["unseen"] if not_recorded(reasons.get(name, "")) == column]
     if not names:
         return ""
-    return f" Without the table's angles {', '.join(names)} could not be tried: record outer_deg and inner_deg."
+    more = f" and {len(names) - _MOST_UNTRIED} more" if len(names) > _MOST_UNTRIED else ""
+    return f" Without {what} {', '.join(names[:_MOST_UNTRIED])}{more} could not be tried: {remedy}."
 
 
 def why_first(document: DiagnosisDocument) -> list[str]:

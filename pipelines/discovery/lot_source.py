@@ -55,17 +55,24 @@ class DiscoveryArchive:
 
     @cached_property
     def infos(self) -> list[Any]:
-        """Finished runs with dwells, without re-runs, in the order of their start."""
+        """Finished runs with dwells in the order of their start; of the re-runs only the fits of imports."""
+        stages = ({"reduce", "import"}, {"import"})
         return [
-            info
-            for info in self.archive.runs()
-            if info.finished and not info.rerun_of and {"reduce", "import"} & set(info.stages)
+            info for info in self.archive.runs() if info.finished and stages[bool(info.rerun_of)] & set(info.stages)
         ]
+
+    @cached_property
+    def _imports(self) -> dict[str, str]:
+        """For each fit of an import the run that imported its dwells; it is one lot with all its fits."""
+        first: dict[str, str] = {}
+        for run, source in ((info.id, str(info.rerun_of)) for info in self.infos if info.rerun_of):
+            first[run] = first.get(source, source)
+        return first
 
     @cached_property
     def device(self) -> str:
         """The kind of device that is judged: the given one, else that of most runs."""
-        counts = Counter(info.device for info in self.infos)
+        counts = Counter(info.device for info in self.infos if info.id not in self._imports)
         if self._device:
             wanted = next((count for count in counts if count.lower() == self._device.lower()), None)
             if wanted is None:
@@ -83,7 +90,7 @@ class DiscoveryArchive:
     @property
     def other_devices(self) -> dict[str, int]:
         """Runs of other kinds of devices, which are never pooled with it."""
-        counts = Counter(info.device for info in self.infos)
+        counts = Counter(info.device for info in self.infos if info.id not in self._imports)
         return {device: count for device, count in counts.items() if device != self.device}
 
     def score(self, workers: int, distribute: Distributor | None = None) -> int:
@@ -110,9 +117,17 @@ class DiscoveryArchive:
         return [(run, reason) for run, reason in self._reasons() if reason]
 
     def _reasons(self) -> Iterator[tuple[str, str]]:
-        """Runs of the device with scores, in the order of arrival, with the reason if left out, else empty."""
-        heads = ((run, self.store.head(run)) for run in self.store.rows)
-        return ((run, str(head["left_out"] or "")) for run, head in heads if head["device"] == self.device)
+        """Runs of the device with scores, in the order of arrival, with the reason if left out, else empty.
+
+        An import counts by the first of its fits that can be pooled; where none can, the last states the reason.
+        """
+        lots = dict[str, tuple[str, str]]()
+        for run in self.store.rows:
+            head, lot = self.store.head(run), self._imports.get(run, run)
+            if head["device"] == self.device and lots.get(lot, ("", "-"))[1]:
+                lots.pop(lot, None)  # a lot arrives with the run that it counts by
+                lots[lot] = run, str(head["left_out"] or "")
+        yield from lots.values()
 
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:

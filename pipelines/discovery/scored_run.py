@@ -77,7 +77,7 @@ def _scored(run: Run) -> ScoredRun:
     slots = {str(unit["serial"]): str(unit.get("slot", "")) for unit in lot_of_run.get("units", [])}
     head: dict[str, Any] = {
         "run": run.id,
-        "when": str(about["when"]),
+        "when": str(about.get("measured") or about["when"]),
         "station": str((about.get("station") or {}).get("name", "")),
         "device": str(lot_of_run.get("device", "")),
         "model": ",".join(effects),
@@ -109,7 +109,7 @@ def _scored(run: Run) -> ScoredRun:
 def _reason(run: Run, effects: Sequence[str], verdict: pd.DataFrame | None) -> str:
     """The reason why a run is not scored, else empty."""
     if not effects:
-        return "it has no model"
+        return "it has no model; 'tumbleline fit' makes a run with one"
     if not (run.path / "dwells.parquet").is_file():
         return "it has no dwells"
     judged = None if verdict is None else verdict_of(verdict)

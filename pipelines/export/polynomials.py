@@ -179,9 +179,7 @@ def graded_units(run: Run, serials: tuple[str, ...], *, failed: bool, revoked: b
     allowed = ("pass", "fail") if failed else EXPORTABLE
     chosen = [unit for unit in (serials or tuple(table.index)) if table.loc[unit, "outcome"] in allowed]
     if not chosen:
-        raise WrongUse(
-            f"export: no unit of run {run.id} passed, at least one is needed; --include failed exports failed ones too"
-        )
+        raise WrongUse(f"run {run.id}: no unit passed, at least one is needed; --include failed takes failed ones, too")
     certificates = stated(run, chosen)
     if not revoked:
         chosen = _not_revoked(run, chosen, certificates, named=bool(serials))
@@ -192,20 +190,18 @@ def graded_units(run: Run, serials: tuple[str, ...], *, failed: bool, revoked: b
 def _imported(run: Run, serials: tuple[str, ...]) -> Chosen:
     """The units of an import that was fitted without limits; a captured run without grades is not finished."""
     if run.about.get("capture"):
-        raise WrongUse(
-            f"export: run {run.id} has no grades, they are needed; it is not finished: repeat its 'tumbleline run'"
-        )
+        raise WrongUse(f"run {run.id} has no grades, they are needed; it is not finished: repeat its 'tumbleline run'")
     if axis := run.about.get("plane_across"):
         raise WrongUse(
-            f"export: run {run.id} was turned about {axis} alone: the scale of {axis} is not known, and a correction needs three "
+            f"run {run.id} was turned about {axis} alone: the scale of {axis} is not known, and a correction needs three "
             f"axes; measure other orientations ('tumbleline fit {run.id}' prints what is known of the others)"
         )
     refuse_other_procedures(run, "coefficients")
     missing = [name for name in ("dwells", "coefficients", "covariance") if name not in run.tables()]
     if missing:
         raise WrongUse(
-            f"export: run {run.id} was imported and has no {', '.join(missing)}; fit it with 'tumbleline fit {run.id} --effects "
-            "bias,scale,misalignment' and export the run that this makes"
+            f"run {run.id} was imported and has no {', '.join(missing)}; fit it with 'tumbleline fit {run.id} --effects "
+            "bias,scale,misalignment' and take the run that this makes"
         )
     units = tuple(dict.fromkeys(run.table("coefficients")["unit"].tolist()))
     _refuse_unknown(serials, units)
@@ -254,8 +250,8 @@ def _not_revoked(
     gone = [unit for unit in chosen if unit in certificates and certificates[unit].state == "revoked"]
     if gone and (named or len(gone) == len(chosen)):
         raise WrongUse(
-            f"export: the calibration of unit {gone[0]} in run {run.id} was revoked ({certificates[gone[0]].reason}), a "
-            "valid one is needed; measure the unit again, or export the old coefficients with --include revoked"
+            f"the calibration of unit {gone[0]} in run {run.id} was revoked ({certificates[gone[0]].reason}), a "
+            "valid one is needed; measure the unit again, or take the old coefficients with --include revoked"
         )
     return [unit for unit in chosen if unit not in gone]
 
@@ -263,19 +259,19 @@ def _not_revoked(
 def _refuse_unknown(serials: tuple[str, ...], units: Collection[str]) -> None:
     for unit in serials:
         if unit not in units:
-            raise WrongUse(f"export: no unit {unit} in this run; {did_you_mean(unit, units)}")
+            raise WrongUse(f"no unit {unit} in this run; {did_you_mean(unit, units)}")
 
 
 def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> None:
     _refuse_unknown(serials, grades.index.tolist())
     for unit in serials:
-        outcome, reasons = grades.loc[unit, "outcome"], grades.loc[unit, "reasons"]
+        outcome, reasons = grades.loc[unit, "outcome"], plain_reason(str(grades.loc[unit, "reasons"]))
         if outcome == "refused":
             raise WrongUse(
-                f"export: the data of unit {unit} were refused ({reasons}), so it has no coefficients; measure it again"
+                f"the data of unit {unit} were refused ({reasons}), so it has no coefficients; measure it again"
             )
         if outcome == "fail" and not failed:
-            raise WrongUse(f"export: unit {unit} failed ({reasons}); --include failed exports its coefficients")
+            raise WrongUse(f"unit {unit} failed ({reasons}); --include failed takes its coefficients")
 
 
 def effects_left_out(calibration: Calibration) -> tuple[str, ...]:

@@ -113,7 +113,8 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
     """
     _require(frame, REQUIRED, where)
     _refuse_half_an_axis(frame, where)
-    frame = frame.copy()
+    empty = [name for name in ("unit_C", "chamber_C") if name in frame.columns and frame[name].isna().all()]
+    frame = frame.drop(columns=empty)  # not recorded, which a diagnosis tells
     frame["unit"] = _units(frame, where, foreign=foreign)
     for column in frame.columns:
         if column == "unit" or column in _TEXTS:

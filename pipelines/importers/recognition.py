@@ -10,7 +10,17 @@ import pandas as pd
 
 from inertial import change_of_level
 from inertial.arrays import Array
-from pipelines.importers import clocks, files, guesses, sample_faults, sources, stretches, unit_check, values
+from pipelines.importers import (
+    clocks,
+    files,
+    guesses,
+    named_columns,
+    sample_faults,
+    sources,
+    stretches,
+    unit_check,
+    values,
+)
 from pipelines.importers.content import Content
 from pipelines.importers.exchange import is_exchange
 from pipelines.importers.guesses import Guesses, measurable
@@ -125,7 +135,14 @@ def of_content(
     if len(paths) == 1 and is_exchange(content.table.columns):
         guessed = guesses.guesses_of_dwells(content.table)
         return Recognition(tuple(paths), content, source, guessed, is_exchange=True)
-    guessed = guesses.guesses(content)
+    serial = named_columns.serials(content.table)
+    by_unit = content
+    if serial:  # a clock and numbers of dwells are those of one unit, however the rows are mixed, and so is a stop
+        number = content.table.groupby(serial, sort=False).ngroup()
+        by_unit = replace(content, table=content.table.loc[number.sort_values(kind="stable").index])
+        breaks = [*breaks, *(np.flatnonzero(np.diff(number)) + 1).tolist()]
+    guessed = guesses.guesses(by_unit)
+    content = by_unit if guessed.dwells else content
     time, open_ = _time(content, guessed)
     output = _output(content, guessed)
     finite = np.ones(len(content.table), dtype=bool) if output is None else np.isfinite(output).all(axis=1)

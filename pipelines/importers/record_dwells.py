@@ -8,6 +8,7 @@ import pandas as pd
 
 from inertial import frames
 from inertial.arrays import Array, Index
+from inertial.counts import number_of
 from inertial.estimation.slow_noise import FEWEST_SAMPLES, slow_deviation
 from inertial.quantities import ANGLE_COLUMNS, BY_COLUMN, FORCE_COLUMNS
 from pipelines.importers.exchange import complete_references
@@ -165,8 +166,9 @@ def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataF
         count = _held_out_count(text, len(places))
         if len(places) - count < FEWEST_FITTED:
             raise DataRejected(
-                f"{where}: {len(places)} dwells of unit {unit}, verify={shown(text)} leaves {max(len(places) - count, 0)} "
-                f"of them, {FEWEST_FITTED} are needed for the fit at least; hold out fewer, or measure more positions"
+                f"{where}: {number_of(len(places), 'dwell')} of unit {unit}, verify={shown(text)} leaves "
+                f"{max(len(places) - count, 0)} of them, {FEWEST_FITTED} are needed for the fit at least; hold out fewer, or "
+                "measure more positions"
             )
         chosen = places[_drawn(len(places), count)]
         kinds[chosen] = "verification"

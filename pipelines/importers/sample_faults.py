@@ -6,6 +6,7 @@ import numpy as np
 
 from inertial import record_faults
 from inertial.arrays import Array, Flags, Index
+from inertial.counts import number_of
 from pipelines.importers.documents import FaultName, SampleFaultDocument
 from pipelines.importers.mapping import Mapping
 from pipelines.importers.stretches import Stretches
@@ -120,7 +121,9 @@ def sound_dwells(
         )
     if mapping.faulty == "leave-out":
         sound[rows] = False
-    return sound, (f"{rows.size} dwells with a constant axis {'kept' if sound.all() else 'left out'}: {found}",)
+    return sound, (
+        f"{number_of(rows.size, 'dwell')} with a constant axis {'kept' if sound.all() else 'left out'}: {found}",
+    )
 
 
 def refuse_or_remark(faults: SampleFaults, output: Array, time: Array, mapping: Mapping, where: str) -> tuple[str, ...]:

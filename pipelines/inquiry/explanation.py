@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inertial import frames
+from inertial.counts import number_of
 from inertial.next_measurement.menus import Kind
 from inertial.next_measurement.proposals import Proposal
 from inertial.planning.reasons import begins_again, confounding_feature, constant_feature, reason
@@ -78,7 +79,7 @@ def _directions(steps: Sequence[SequenceStep]) -> str:
     force = np.abs([frames.force_from_angles(s.outer, s.inner) for s in steps])
     levels = sorted({f"{v:.2f}" for v in np.round(force[(force > 0.02) & (force < 0.98)] / 0.05) * 0.05})
     shown = ", ".join(levels[:4]) + (" …" if len(levels) > 4 else "")
-    return f"{len(steps)} dwells" + (f" with |f| of {shown} g on an axis" if levels else " on faces")
+    return number_of(len(steps), "dwell") + (f" with |f| of {shown} g on an axis" if levels else " on faces")
 
 
 def _temperatures(steps: Sequence[SequenceStep]) -> str:

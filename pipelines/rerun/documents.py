@@ -182,4 +182,5 @@ class ImportedFitDocument(TypedDict):
     leave_out: LeaveOut | None
     missing: Annotated[list[list[str]], "classes of effects that are missing"]
     lines: Annotated[list[str], "the same in words"]
+    faulty: Annotated[list[str], "units with a data fault, which are not judged: do not use their coefficients"]
     open: NotRequired[Annotated[list[str], "of a unit that was turned about one axis: what that does not show"]]

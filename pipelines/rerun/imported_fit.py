@@ -38,6 +38,7 @@ def fit_document(done: Run, source: str) -> ImportedFitDocument:
         "left_out": list(done.about.get("left_out", [])),
         "units": units,
         **{key: judged[key] for key in keys},
+        "faulty": sorted({unit for fault in judged.get("blocked_by", ()) for unit in fault["units"]}),
     }
     return document
 

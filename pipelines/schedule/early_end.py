@@ -6,6 +6,7 @@ from typing import Annotated
 import pandas as pd
 from typing_extensions import TypedDict
 
+from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.schedule.steps import TUMBLED, Step, steps
 from pipelines.tables.frames import rows_of
@@ -127,7 +128,7 @@ def early_end_sentence(end: EarlyEnd, unit: str = "") -> str:
     if not end["ended"]:
         return "; ".join(last)
     soaks = ", ".join(f"{t:g}" for t in end["soaks_C"])
-    parts = [f"ended when it was known: {end['reason']}", f"{end['dwells']} dwells of the plan not taken"]
+    parts = [f"ended when it was known: {end['reason']}", f"{number_of(end['dwells'], 'dwell')} of the plan not taken"]
     if soaks:
         parts[-1] += f", no soak at {soaks} °C any more"
     if end["given_up"]:

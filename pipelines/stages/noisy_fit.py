@@ -9,6 +9,7 @@ import numpy as np
 from inertial import design
 from inertial import effects as catalogue
 from inertial.arrays import Array, Flags
+from inertial.counts import number_of
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
 from inertial.fits.linear import LotFit, felt_force, fit_lot, of_every_axis, own_axes, pseudo_inverses
@@ -113,8 +114,8 @@ def _refuse_short(lot: LotArrays, effects: Sequence[str], there: Flags) -> None:
     for unit, count in zip(lot.units, there.sum(axis=1).tolist(), strict=True):
         if count < least:
             raise DataRejected(
-                f"fit: unit {unit} has {count} dwells, at least {least} are needed for its coefficients on an axis, in a model "
-                "with values that all units share; leave the unit out, or measure it again"
+                f"fit: unit {unit} has {number_of(count, 'dwell')}, at least {least} are needed for its coefficients on an axis, "
+                "in a model with values that all units share; leave the unit out, or measure it again"
             )
 
 

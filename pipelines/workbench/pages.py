@@ -82,6 +82,8 @@ class Workbench:
         except TumblelineError as problem:
             problems.append(str(problem))
             return None, None
+        if kind == "import" and (made := self.jobs.result(kind, content)) and made["run"] not in self.archive.run_ids():
+            self.jobs.forget(kind, content)  # its run was removed since
         job = self.jobs.known(kind, content)  # first: a job that ends between the looks has its result in the second
         return self.jobs.result(kind, content), job
 

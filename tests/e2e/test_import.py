@@ -290,6 +290,9 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     frame[["ax", "ay", "az"]] /= 16384.0  # the advice, followed, leads to a fit
     imported(written(frame), *mapped, "--unit-of", "output=g", "--set", "block_s=10")
     text_of(*fit)
+    pooled = document_of("discover", status=None)["pooled"]  # the lot counts by its fit
+    assert pooled["lots"] == 1
+    assert not any(row["run"] == document_of("list")["runs"][-2]["id"] for row in pooled["left_out"])
 
 
 def test_faces_without_a_known_noise_print_no_number_that_is_none() -> None:

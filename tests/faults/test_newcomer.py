@@ -79,7 +79,7 @@ def test_a_model_with_as_many_coefficients_as_dwells_is_not_called_adequate(
     lot(rng, units=2, temperatures=(25.0,)).query("dwell < 4").to_csv(tmp_path / "few.csv", index=False)
     status, out, message = given(command, tmp_path / "few.csv", "--effects", "bias,scale,misalignment")
     assert (status, out) == (2, "")
-    assert "4 dwells a unit leave no degree of freedom to judge the model" in message
+    assert "4 dwells a unit and no degree of freedom to judge the model" in message
 
 
 def test_close_matches_do_not_care_for_capitals_and_an_empty_list_names_no_effect(tmp_path: Path) -> None:

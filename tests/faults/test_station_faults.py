@@ -89,6 +89,16 @@ def test_a_server_that_is_gone_is_a_lost_link_with_its_address():
         assert link.read(10, 0, 1, "slots") == [8]
         with pytest.raises(StationRefused, match="free port"):  # its port is taken
             PlantServer(make_plant(load_station(), lot_of(1)), port=port).__enter__()
+        begin = {
+            "host": "127.0.0.1",
+            "port": port - 1,
+            "speed": 1.0,
+            "stop": threading.Event(),
+            "ready": lambda *_: None,
+        }
+        told = rf":\d+ .*, free ports {port - 1} \(registers\) to \d+ \(one for each text protocol\) are needed"
+        with pytest.raises(StationRefused, match=told):
+            serve(load_station(), lot_of(1), **begin)
     with pytest.raises((LinkLost, StationTimeout), match=f"127.0.0.1:{port}"):
         link.read(10, 0, 1, "slots")
     link.close()

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 
 from inertial.arrays import Flags
+from inertial.counts import number_of
 from inertial.data_errors.exchanged import EDGE, PlainFit
 from inertial.estimation.alternative import Array, Handling, Misfit, by_block
 from inertial.estimation.lot import Lot
@@ -54,7 +55,7 @@ class UnitsSwapped(Handling):
         unit, other, then = _exchanged_dwells(lot, **location)
         apart = 1e6 * float(np.sqrt(np.mean((lot.output[unit, then] - _of_other(lot, unit, other)[0, then]) ** 2)))
         back = int(location["until"] - location["dwell"])
-        back = "" if location["until"] >= then.size else f" for {back} dwells"
+        back = "" if location["until"] >= then.size else f" for {number_of(back, 'dwell')}"
         return f"exchanged before this dwell{back}, readings {apart:.0f} µg apart; they are exchanged back"
 
     def settled(self, lot: Lot, size: Array, misfit: Misfit, **location: float) -> Lot | None:

@@ -331,7 +331,7 @@ def _conditions(w: _Writer, parent: Any, c: CertificateContent) -> None:
 
 def _conformity(w: _Writer, parent: Any, conformity: Conformity, c: CertificateContent) -> None:
     w.add(parent, "norm", " ".join(c.decision_rule.split()))
-    limit = f"limit {conformity.limit:g} {conformity.unit} of '{c.limits}'"
+    limit = f"limit {conformity.limit:.10g} {conformity.unit} of '{c.limits}'"
     text = f"{conformity.figure}: {limit}, specific probability of false acceptance {least_of(conformity.pfa)}"
     w.text(parent, "declaration", f"{text}. {c.grade_statement}".removesuffix(". "))
     w.add(parent, "conformity", OUTCOMES.get(conformity.outcome, "noPass"))

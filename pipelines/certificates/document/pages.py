@@ -5,6 +5,7 @@ from typing import Any
 
 from pipelines.certificates.document.content import Adjustment, CertificateContent, Contribution, Response
 from pipelines.certificates.document.numbers import probability, rounded, significant, with_uncertainty
+from schemas.decisions import digits_beside
 
 SMALLEST_SHARE = 5e-4  # of a row of a budget: less is printed as 0.0 %
 
@@ -190,8 +191,13 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
     for decision in c.conformity:
         size = abs(decision.value)
         printed = (significant(size), "") if decision.expanded <= 0.0 else with_uncertainty(size, decision.expanded)
-        edges = significant(decision.limit), significant(decision.accept, 4)
-        rows.append([decision.figure, *printed, *edges, decision.unit, decision.outcome, probability(decision.pfa)])
+        edges = [
+            significant(e, digits_beside(e, decision.limit, d)) for e, d in ((decision.limit, 3), (decision.accept, 4))
+        ]
+        told = max(printed[0], significant(size, digits_beside(size, decision.limit, 1)), key=len)
+        rows.append(
+            [decision.figure, told, printed[1], *edges, decision.unit, decision.outcome, probability(decision.pfa)]
+        )
     heads = ["figure", "magnitude", "U", "limit", "accepted up to", "unit", "decision", "PFA"]
     table = _table("", heads, rows, [1, *["auto"] * 7], [1, 2, 3, 4, 7])
     passed = all(decision.outcome == "pass" for decision in c.conformity)

@@ -122,6 +122,8 @@ def next_of_recording(
 ) -> list[str]:
     """The commands to give next: the fit of a changed model; without faulty dwells, else the coefficients, else the diagnosis.
 
+    A fault from one dwell on, or of all dwells of a unit, leaves none to go on with: the diagnosis shows where it begins.
+
     model, repeated : options of ``improve``: the model that was judged; the file to write and the author
     """
     data = JudgedData(recording["run"], "", given.fresh, given.fresh_history, given=given)
@@ -195,6 +197,6 @@ def _missing(document: ImproveDocument) -> None:
         say(f"  {text}", style="yellow")
     for row in document["ladder"]:
         known = row["heldout_ug"] is not None and math.isfinite(row["heldout_ug"])
-        held = "" if not known else f", on dwells left out {row['heldout_ug']:.0f} µg"
+        held = "" if not known else f", {row['heldout_ug']:.0f} µg of dwells predicted by a fit without them"
         added = f" with {', '.join(row['added'])}" if row["added"] else ""
-        say(f"  error{added}: fitted {row['fitted_ug']:.0f} µg{held}; noise {row['noise_ug']:.0f} µg")
+        say(f"  rms error{added}: {row['fitted_ug']:.0f} µg of the fitted dwells{held}; noise {row['noise_ug']:.0f} µg")

@@ -20,7 +20,8 @@ def print_plan(document: dict[str, Any]) -> None:
     minutes, error = document["minutes"], document["dwell_error_ug"]
     say(
         f"{document['recipe']} with {document['device']} on station {document['station']}: "
-        f"{document['dwells']} dwells in {document['poses']} poses at {number_of(len(document['temperatures_C']), 'soak')}"
+        f"{number_of(document['dwells'], 'dwell')} in {number_of(document['poses'], 'pose')} at "
+        f"{number_of(len(document['temperatures_C']), 'soak')}"
     )
     say(_time(minutes))
     say(
@@ -202,7 +203,7 @@ def print_optimum(document: dict[str, Any], where: Sequence[str]) -> None:
     """Print the recipe found; ``where``: options that name its station and archive."""
     temperatures = ", ".join(f"{t:g}" for t in document["temperatures_C"])
     say(
-        f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
+        f"{document['recipe']}: {number_of(document['dwells'], 'dwell')} of {document['dwell_s']:g} s "
         f"in {document['poses']} poses, {'ramps to' if document['ramp'] else 'soaks at'} {temperatures} °C"
     )
     minutes, given, textbook = document["minutes"], document["own_minutes"], document["textbook_minutes"]
@@ -238,7 +239,7 @@ def _comparison(document: dict[str, Any]) -> list[str]:
     )
     first = (
         f"The new recipe takes {difference}, and {100.0 * document['share']:.0f} % of the textbook plan's time without the "
-        f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
+        f"static record; {number_of(document['verification_dwells'], 'dwell')} for verification (textbook plan: none)."
     )
     lines = [first]
     if document["bound"] is not None:

@@ -1,5 +1,6 @@
 """The verdict on the model of a run, and on its stated references, for people."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Run
@@ -21,10 +22,11 @@ def print_verdict(document: "DiagnosisDocument") -> None:
     say(verdict(document), STYLE_OF[document["adequate"]])
 
 
-def print_verdict_of_fit(adequate: bool | None, not_adequate: str) -> None:
-    """Print whether a fit is adequate; ``not_adequate``: what is wrong where it is not."""
+def print_verdict_of_fit(adequate: bool | None, not_adequate: str, faulty: Sequence[str] = ()) -> None:
+    """Print whether a fit is adequate, else what is wrong, and the units with a data fault, to which it does not apply."""
     texts = {True: "adequate", False: f"NOT ADEQUATE: {not_adequate}", None: "CANNOT BE JUDGED: see above"}
-    say(f"  {texts[adequate]}", STYLE_OF[adequate])
+    without = f"; do not use {', '.join(faulty)}: not judged, because of a data fault" if faulty else ""
+    say(f"  {texts[adequate]}{without}", STYLE_OF[None if faulty and adequate else adequate])
 
 
 def judged(document: dict[str, Any], run: Run) -> dict[str, Any]:

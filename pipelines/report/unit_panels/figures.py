@@ -1,4 +1,4 @@
-"""Figures of merit of a unit against their limits: three digits, as everywhere that a run is shown, and U to two."""
+"""Figures of merit of a unit against their limits: three digits or as many as show the decision, U two."""
 
 from typing import Any
 
@@ -9,6 +9,7 @@ from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.stages.figures import figure_label
 from pipelines.tables.frames import rows_of
+from schemas.decisions import digits_beside
 
 ORDER = 20
 TITLE = "Figures and limits"
@@ -32,15 +33,14 @@ def render(unit: UnitContext) -> str:
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
     least, most = float(row.get("least", np.nan)), float(row["limit"])
-    if np.isfinite(least):
-        limit, margin = f"≥ {significant(least)}", significant(row["value"] - least)
-    else:  # both are empty without a limit
-        limit, margin = significant(most), significant(most - abs(row["value"]))
+    edge = least if np.isfinite(least) else most
+    limit = significant(edge, digits_beside(edge, edge))  # this and the margin are empty without a limit
+    margin = significant(row["value"] - least if np.isfinite(least) else most - abs(row["value"]))
     return {
         "title": figure_label(row["figure"]),
-        "value": significant(row["value"]),
+        "value": significant(row["value"], digits_beside(row["value"], edge)),
         "uncertainty": significant(row["uncertainty"], 2) if row["uncertainty"] > 0.0 else "",
-        "limit": limit,
+        "limit": f"≥ {limit}" if np.isfinite(least) else limit,
         "margin": margin,
         "unit": "" if row["unit_text"] == "1" else row["unit_text"],
         "outcome": row["outcome"] if limit else "",

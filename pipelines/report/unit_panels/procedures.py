@@ -12,6 +12,7 @@ from pipelines.report.interactive import figure_of
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
+from schemas.decisions import digits_beside
 
 ORDER = 45
 TITLE = "Test procedures"
@@ -72,6 +73,10 @@ def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> d
     outcome = decided.loc[decided["figure"] == row["figure"], "outcome"].tolist()
     expanded = unit.report.coverage * row["uncertainty"]
     value, spread = with_uncertainty(row["value"], expanded)
+    edge = limit if np.isfinite(limit) else least
+    if limited and known:
+        value = max(value, significant(row["value"], digits_beside(row["value"], edge, 1)), key=len)
+    limit_text = significant(edge, digits_beside(edge, edge))
     ends = [row["low"], row["high"]]
     interval = " … ".join(with_uncertainty(end, expanded)[0] for end in ends) if np.isfinite(ends).all() else ""
     return {
@@ -81,7 +86,7 @@ def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> d
         "spread": spread if known else "",
         "interval": interval,
         "unit": row["unit_text"],
-        "limit": significant(limit) if np.isfinite(limit) else f"≥ {significant(least)}" if limited else "",
+        "limit": limit_text if np.isfinite(limit) or not limited else f"≥ {limit_text}",
         "outcome": (outcome[0] if outcome else "fail") if limited else "",
         "note": row["note"],
     }

@@ -31,6 +31,7 @@ from pipelines.workbench.pages import (
     table_csv,
 )
 from pipelines.workbench.state import UnitPage, quoted
+from schemas.decisions import digits_beside
 from schemas.errors import WrongUse
 
 router = APIRouter()
@@ -71,7 +72,7 @@ def unit(request: Request) -> Response:
         before=units[index - 1] if index else "", after=units[index + 1] if index + 1 < len(units) else "",
         coefficients=side_by_side(rows.get("coefficients", []), _expanded), parameters=parameters,
         coverage=coverage_of(run.about),
-        names=NAMES, noise_terms=NOISE_TERMS, axis_word=axis_word, figure_label=figure_label,
+        names=NAMES, noise_terms=NOISE_TERMS, axis_word=axis_word, figure_label=figure_label, digits_beside=digits_beside,
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip
 

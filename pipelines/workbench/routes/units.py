@@ -6,8 +6,9 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.archive.listing import RunInfo, info_of
-from pipelines.workbench.pages import asked, page, table_csv
+from pipelines.workbench.pages import Workbench, asked, page, table_csv
 from pipelines.workbench.state import ROWS, UnitsPage
+from schemas.errors import TumblelineError
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Units", 10, "/units"
@@ -22,16 +23,13 @@ def units(request: Request) -> Response:
     bench, state, problems = asked(request, UnitsPage)
     rows = bench.index.ask(state.question()).documents()
     counts = {str(name): int(count) for name, count in bench.index.ask(yield_question(state)).rows}
-    newest = bench.index.ask(newest_question(NEWEST)).rows
-    infos = [info_of(bench.archive.run(str(name))) for name, _ in newest]
-    if state.runs:
-        every = (
-            info_of(bench.archive.run(str(name))) for name, _ in bench.index.ask(newest_question(MOST_LOOKED)).rows
-        )
-        infos = list(islice((info for info in every if info is not None and is_of(info, state.runs)), NEWEST))
+    chosen = bool(state.runs or state.search)
+    newest = bench.index.ask(newest_question(MOST_LOOKED if chosen else NEWEST)).rows
+    infos = (info for name, _ in newest if (info := _info(bench, str(name), problems)) is not None)
+    runs = list(islice((info for info in infos if not chosen or is_of(info, state)), NEWEST))
     return page(
         request, "units.html", state, problems, rows=rows, counts=counts, total=sum(counts.values()), per_page=ROWS,
-        runs=[info for info in infos if info is not None], run_count=newest[0][1] if newest else 0,
+        runs=runs, run_count=newest[0][1] if newest else 0,
     )  # fmt: skip
 
 
@@ -42,11 +40,23 @@ def table(request: Request) -> Response:
     return table_csv(bench.index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING)).documents(), "units")
 
 
-def is_of(run: RunInfo, kind: str) -> bool:
-    """Whether a run is of a kind of the search."""
+def _info(bench: Workbench, name: str, problems: list[str]) -> RunInfo | None:
+    """The line of a run; None for one that cannot be read, whose problem is added."""
+    try:
+        return info_of(bench.archive.run(name))
+    except TumblelineError as problem:
+        problems.append(str(problem))
+        return None
+
+
+def is_of(run: RunInfo, state: UnitsPage) -> bool:
+    """Whether a run is of a state of the search and has its text in its name or in that of a unit, graded or not."""
     passed = None if run.graded is None else run.passed == run.graded
-    kinds = {"unfinished": not run.finished, "finished": run.finished, "all passed": passed is True}
-    return kinds.get(kind, passed is False if kind == "not all passed" else run.verdict == kind)
+    kinds = {"": True, "unfinished": not run.finished, "finished": run.finished, "all passed": passed is True}
+    found = any(state.search.lower() in name.lower() for name in (run.id, *run.units))
+    return found and kinds.get(
+        state.runs, passed is False if state.runs == "not all passed" else run.verdict == state.runs
+    )
 
 
 def yield_question(page: UnitsPage) -> str:

@@ -33,13 +33,14 @@ def upload(request: Request) -> Response:
                 done, job = bench.work("import", state, problems)
         except TumblelineError as problem:
             problems.append(str(problem))
+    problems = [uploads.in_fields(text) for text in problems]
     folder = bench.settings.folder / uploads.FOLDER
     files = [path for path in folder.iterdir() if not path.name.startswith(uploads.PART)] if folder.is_dir() else []
     there = sorted(files, key=lambda file: -file.stat().st_mtime)[:12]
     return page(
         request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(file) for file in there],
         meanings=uploads.FIELDS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
-        level=partial(_level, 0.0 if reading is None else _largest(reading.dwells)),
+        in_fields=uploads.in_fields, level=partial(_level, 0.0 if reading is None else _largest(reading.dwells)),
         outputs=list(OUTPUT_UNITS), times=[*TIME_UNITS, "samples"], temperatures=TEMPERATURE_UNITS,
     )  # fmt: skip
 

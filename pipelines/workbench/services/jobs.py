@@ -125,6 +125,12 @@ class Jobs:
                 self._results.move_to_end(name)
             return self._results.get(name)
 
+    def forget(self, kind: str, request: Mapping[str, Any]) -> None:
+        """Drop a job that is done with its result, so that it can be asked for again."""
+        with self._lock:
+            self._results.pop(key_of(kind, request), None)
+            self._jobs.pop(key_of(kind, request), None)
+
     def known(self, kind: str, request: Mapping[str, Any]) -> BackgroundJob | None:
         """The job of a request; None where it was not asked for."""
         with self._lock:

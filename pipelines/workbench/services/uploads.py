@@ -65,6 +65,22 @@ class UploadReading:
     problem: str = ""
 
 
+_FIELD_OF = {
+    "unit-of output": "Unit of the output", "unit-of time": "Unit of time", "unit-of temperature": "Unit of temperature",
+    "map": "Meaning of the columns", "rate": "Rate", "units": "Serial number", "set local_gravity_m_s2": "Local gravity",
+    "set poses": "Faces", "set rows": "One row is", "fit": "Fit",
+}  # fmt: skip
+"""The fields of the page in place of options of the command ``import``."""
+_OPTION = re.compile(rf"--({'|'.join(_FIELD_OF)})\b(?:=(?!…)([^\s;,]+)|=…| HZ| SN| [a-z_]+=[^\s;,]*)?")
+
+
+def in_fields(text: str) -> str:
+    """A message on an import with the fields of the page in place of options; what the page lacks is of the command line."""
+    text = _OPTION.sub(lambda m: f"the field '{_FIELD_OF[m[1]]}'" + (f" ({m[2]})" if m[2] else ""), text)
+    lacking = "; what begins with -- is an option of 'tumbleline import'"
+    return text + (lacking if " --" in text and "tumbleline" not in text else "")
+
+
 _looking = threading.Lock()
 _looks: OrderedDict[tuple[str, int, int], UploadReading | TumblelineError] = OrderedDict()
 

@@ -294,10 +294,13 @@ def address_of(finding: AuditFinding) -> str:
 def bring_in(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """The import of an uploaded file."""
     report_progress(0, 2, "reading the file")
-    from pipelines.workbench.services.uploads import imported
+    from pipelines.workbench.services.uploads import imported, in_fields
 
     report_progress(1, 2, "importing")
-    return imported(request)
+    try:
+        return imported(request)
+    except TumblelineError as problem:
+        raise type(problem)(in_fields(str(problem))) from None
 
 
 WORK: dict[str, Any] = {

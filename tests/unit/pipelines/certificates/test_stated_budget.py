@@ -129,8 +129,12 @@ def test_a_conditional_result_reads_as_not_accepted_and_a_guard_band_keeps_an_al
     inside, beyond = (decide(limits, "bias_error_ug", 1000.0 - w * 100.0, 100.0) for w in (2.0538, 2.0536))
     assert (inside.outcome, beyond.outcome) == ("pass", "conditional pass")
     assert inside.pfa == pytest.approx(0.02, abs=1e-4)
-    with pytest.raises(RecipeInvalid, match="pfa_max"):
-        parse_limits(LIMITS.format(rule="allowed_pfa", more="pfa_max = 0.05\n"), "limits", UNITS)
+    for rule, largest, told in (
+        ("allowed_pfa", 0.05, "pfa_max"),
+        ("simple_acceptance", 0.01, "found 0.01 beside rule"),
+    ):
+        with pytest.raises(RecipeInvalid, match=told):
+            parse_limits(LIMITS.format(rule=rule, more=f"pfa_max = {largest}\n"), "limits", UNITS)
 
 
 def test_a_run_keeps_its_budget_and_the_risk_of_its_decisions(run: Run) -> None:

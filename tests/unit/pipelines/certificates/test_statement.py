@@ -12,10 +12,12 @@ from typer.testing import Result
 
 from pipelines.archive import Run
 from pipelines.certificates.days import months_after
+from pipelines.export import unit_calibrations
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import change_from_options
 from pipelines.report import make_report
 from pipelines.rerun.rerun import again
+from schemas.errors import WrongUse
 
 Typed = Callable[..., Result]
 
@@ -103,6 +105,10 @@ def test_failed_units_are_marked_in_their_files_and_no_certificate_is_offered_fo
         assert mark in done.stdout, (words, done.stderr)
         assert f"export: A1 {mark}" in done.stderr
         assert "certificate issue" not in done.stderr
+    with pytest.raises(
+        WrongUse, match=r"^unit A1 failed \(Rms residual of the fit: "
+    ):  # read by correct and simulate, too
+        unit_calibrations(run.archive.run(failed), ("A1",), failed=False)
     passed = typed("export", run.id, "--format", "csv")
     assert "FAILED" not in passed.stdout
     assert f"'tumbleline certificate issue {run.id} --archive " in passed.stderr

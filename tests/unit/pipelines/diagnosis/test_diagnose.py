@@ -87,6 +87,11 @@ def test_effects_of_a_table_are_told_to_be_untried_where_its_angles_are_missing(
         unexplained_text({**examination(known, None, None).document, "unexplained": follows})
         for known in (table, forces)
     ]
+    heat = {**follows, "driver": "time_s"}
+    plain = examination(table.drop(columns=["unit_C", "chamber_C"], errors="ignore"), None, None).document
+    assert "more could not be tried: record them in the column unit_C" in unexplained_text(
+        {**plain, "unexplained": heat}
+    )
     assert "angles" not in told[0]
     assert "backlash" in told[1]
     assert "record outer_deg and inner_deg" in told[1]

@@ -407,8 +407,12 @@ def test_columns_named_as_in_the_exchange_format_serials_and_numbers_of_dwells_a
     renamed, rng, tmp_path
 ) -> None:
     file = dwells_of_units(rng).rename(columns=renamed)
+    mixed = file.sort_values(renamed.get("dwell", "dwell"), kind="stable")  # a row of each unit in turn
+    mixed.to_csv(tmp_path / "lot.csv", index=False)
+    in_turn = recognise([tmp_path / "lot.csv"])
     file.to_csv(tmp_path / "lot.csv", index=False)
     seen = recognise([tmp_path / "lot.csv"])
+    assert (in_turn.keys, in_turn.rate_hz, in_turn.open) == (seen.keys, seen.rate_hz, ())
     expected = {meaning: renamed.get(name, name) for meaning, name in IN_EXCHANGE_FORMAT.items()}
     assert seen.keys is not None
     assert seen.keys["columns"] == expected | {"x": "ax", "y": "ay", "z": "az"}

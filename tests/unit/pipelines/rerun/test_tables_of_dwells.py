@@ -122,7 +122,9 @@ def test_a_bad_dwell_of_one_unit_is_left_out_of_it_alone(tmp_path: Path) -> None
     kept = archive.run(without.new)
     assert set(kept.about["left_out"]) == {"B:7"}
     assert set(kept.table("dwells").query("dwell == 7")["unit"]) == {"A", "C"}
-    lines = "\n".join(fit_document(kept, whole.new)["lines"])
+    document = fit_document(kept, whole.new)
+    assert document["faulty"] == ["C"]
+    lines = "\n".join(document["lines"])
     assert "B lacks 7; units are fitted" in lines
     assert "\ndata fault of C (not judged): axis_flip, dwells all: x reads −x" in lines
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pipelines.jobs.recipes import read_limits, sample_names
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures
-from schemas.decisions import GRADES, decide, grade_with
+from schemas.decisions import GRADES, beside_limit, decide, digits_beside, grade_with
 from schemas.errors import RecipeInvalid
 from schemas.limits import Limits, parse_limits
 
@@ -34,6 +34,10 @@ def limits(rule: str = "guarded_acceptance") -> Limits:
 def test_names_value_uncertainty_limit_margin_and_rule() -> None:
     decision = decide(limits(), "bias_error_ug", 130.0, 5.0)
     assert decision.sentence == "bias_error_ug fail: 130 ± 10 µg, limit 100 µg, margin -30 µg"
+    near = {(16.247, 16.25): "16.247", (16.254, 16.25): "16.254", (16.2, 16.25): "16.2", (1234.56, 1000.0): "1235"}
+    for (value, limit), told in near.items():  # the digits show on which side of the limit the value lies
+        assert beside_limit(value, 0.57, limit, " mg") == f"{told} ± 0.57 mg, limit {limit:g} mg"
+    assert [digits_beside(limit, limit) for limit in (16.25, 1000.0, 0.5)] == [4, 3, 3]
     undecided = decide(limits(), "bias_error_ug", 95.0, 5.0)
     assert undecided.sentence == (
         "bias_error_ug not accepted: inside the guard band, 95 ± 10 µg, limit 100 µg, probability of exceeding it 16 %: "

@@ -71,6 +71,8 @@ def test_a_stopped_job_ends_its_process_and_the_next_one_runs_is_shared_and_fail
     ended(table, first.id)
     assert table.get(job.id).state == "stopped"
     assert table.result("plan", request) is None
+    table.forget("plan", request)  # what it made was removed
+    assert table.known("plan", request) is None
     table.close()
     path = tmp_path / "jobs.json"  # what a dead server was at is interrupted and never running
     running = {"id": "a", "kind": "plan", "title": "t", "state": "running"}
@@ -249,6 +251,11 @@ def test_files_of_the_folder_alone_are_sources_and_an_upload_stays_in_it_whateve
             keep(name, b"1")
     with pytest.raises(WrongUse):
         uploads.resolve(settings, "/etc/passwd")
+    told = "give --unit-of output=g, or --unit-of time=…; --rate HZ, --set gaps=split"
+    assert uploads.in_fields(told) == (
+        "give the field 'Unit of the output' (g), or the field 'Unit of time'; the field 'Rate', --set gaps=split; what begins "
+        "with -- is an option of 'tumbleline import'"
+    )
 
 
 def test_a_run_that_was_added_is_in_the_next_answer_and_an_unchanged_archive_is_not_looked_at_again(
