@@ -159,7 +159,7 @@ def robust_fits(force: Array, output: Array, theta: Array | None = None, *, leas
     least : (units,) or one, residual norm, output unit, up to which a dwell has full weight: where many dwells agree closely,
         dwells at another temperature would otherwise have no weight
     """
-    there = np.isfinite(output).all(axis=-1)
+    there: Flags = np.all(np.isfinite(output), axis=-1)
     x, y = (np.where(there[..., None], values, 0.0) for values in (design(force, theta), output))
     weight, floor = there.astype(float), np.broadcast_to(least, len(y))
     coefficients = np.zeros((len(y), x.shape[-1], y.shape[-1]))

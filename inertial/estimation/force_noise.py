@@ -38,6 +38,12 @@ _LEAST = 0.03
 
 _ROUNDS = 5
 
+_DRAWS = 10
+"""Draws of noise for each unit and axis, so that the expectation they give is surer than what it is compared with."""
+
+_REPEATED = 1e-6
+"""Smallest share of a dwell's variance that poses and soaks leave where its pose was measured again."""
+
 
 def by_force(model: Model, soak: Places | None = None) -> Array | None:
     """White standard deviation of each dwell over that of its axis, (units, n, axes); None if it does not depend on force.
@@ -72,17 +78,20 @@ def by_force(model: Model, soak: Places | None = None) -> Array | None:
     projector = np.eye(n) - q @ q.T
     slow = _projected_slow_variance(model, projector) * scale
     alone[~complete_blocks] = alone[complete_blocks].mean()
-    sizes = _log_squares_by_class((left**2 / (alone @ projector**2 + slow))[complete_blocks], along[complete_blocks])
-    if sizes is None or not differ(sizes):
+    judged = np.ix_(np.flatnonzero(complete_blocks), np.flatnonzero(np.diagonal(projector) > _REPEATED))
+    classes = np.digitize(along[judged], _EDGES)
+    filled = [k for k in range(len(_EDGES) + 1) if np.all(np.sum(classes == k, axis=1) >= _FEWEST)]
+    if len(filled) < 2 or len(classes) < 2:
+        return None
+    sizes = _log_squares((left**2 / (alone @ projector**2 + slow))[judged], classes, filled)
+    if not differ(sizes - _expected_log_squares(model, projector, judged, classes, filled)):
         return None
     variance = np.ones_like(left)
     for _ in range(_ROUNDS):  # iterated, because each residual contains noise of the other dwells
         white = (alone * variance) @ projector**2
-        ratio = (left**2 / (white + slow))[complete_blocks]
+        ratio = (left**2 / (white + slow))[judged]
         ratio /= ratio.mean(axis=1, keepdims=True)
-        curve = _variance_at(
-            along[complete_blocks], np.minimum(ratio, _clipping_limits(ratio, along[complete_blocks])), along
-        )
+        curve = _variance_at(along[judged], np.minimum(ratio, _clipping_limits(ratio, along[judged])), along)
         variance *= np.maximum((curve * (white + slow) - slow) / white, _LEAST)
         variance = np.maximum(variance / np.mean(variance, axis=1, keepdims=True), _LEAST)
     return np.swapaxes(np.sqrt(variance).reshape(units, problem.per_unit, n), 1, 2)
@@ -121,14 +130,29 @@ def _projected_slow_variance(model: Model, projector: Array) -> Array:
     return slow
 
 
-def _log_squares_by_class(ratio: Array, along: Array) -> Array | None:
-    """Log mean squares (blocks, classes) of the ratios in each class of force; None for fewer than two classes or blocks."""
-    classes = np.digitize(along, _EDGES)
-    filled = [k for k in range(len(_EDGES) + 1) if np.all(np.sum(classes == k, axis=1) >= _FEWEST)]
-    if len(filled) < 2 or len(ratio) < 2:
-        return None
-    inner = np.stack([inner_mean(np.where(classes == k, np.sqrt(ratio), np.nan)) for k in filled], axis=1)
-    return np.log(np.maximum(inner, 1e-300))
+def _log_squares(ratio: Array, classes: Places, filled: list[int]) -> Array:
+    """Log mean squares (blocks, k) of the ratios (blocks, n) in each of k classes of force."""
+    inner = [inner_mean(np.where(classes == k, np.sqrt(ratio), np.nan)) for k in filled]
+    return np.log(np.maximum(np.stack(inner, axis=1), 1e-300))
+
+
+def _expected_log_squares(
+    model: Model, projector: Array, judged: tuple[Places, ...], classes: Places, filled: list[int]
+) -> Array:
+    """What :func:`_log_squares` is on average of the model's noise: the mean log of few values is below that of many."""
+    covariance, dwells = model.problem.covariance, np.arange(model.problem.n)
+    blocks, seen = judged[0][:, 0], judged[1][0]
+    alike: dict[tuple[object, ...], list[int]] = {}
+    for k, block in enumerate(blocks):
+        alike.setdefault((covariance.like_of(block, model.noise), classes[k].tobytes()), []).append(k)
+    expected = np.empty((len(blocks), len(filled)))
+    for members in alike.values():
+        first = blocks[members[0]]
+        root = (projector @ np.linalg.cholesky(covariance.of_dwells(first, model.noise, dwells)))[seen]
+        drawn = np.random.default_rng(first).standard_normal((_DRAWS * len(members), dwells.size)) @ root.T
+        sizes = _log_squares(drawn**2 / np.sum(root**2, axis=1), classes[members[0]], filled)
+        expected[members] = sizes.mean(axis=0)
+    return expected
 
 
 def _clipping_limits(ratio: Array, along: Array) -> Array:
