@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from in_process import command
 from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
@@ -206,13 +207,24 @@ def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
 
 def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None:
     path = tmp_path / "lot.csv"
-    table(np.random.default_rng(8)).assign(slot=3).to_csv(path, index=False)
+    table(np.random.default_rng(8), units="ABCD").assign(slot=3).to_csv(path, index=False)
     with pytest.raises(WrongUse, match=r"takes --unit-of output=… and --device alone \(found local_gravity_m_s2\)"):
         import_document([path], {"local_gravity_m_s2": 9.8}, "", "", str(tmp_path / "archive"), None, nullcontext)
     done = import_document([path], {"units": {"output": "mg"}}, "", "", str(tmp_path / "archive"), None, nullcontext)
     run = Archive(str(tmp_path / "archive")).run(done["run"])
     assert run.table("dwells")["out_x"].max() < 2e-3
-    assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3]
+    assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3, 3]
+    assert run.about["name"] == "dwells of A, B, C, …"
+
+
+def test_the_yield_of_an_import_is_that_of_imports(tmp_path: Path) -> None:
+    """It has no station, whose name would stand there."""
+    path, limits, words = tmp_path / "lot.csv", tmp_path / "limits.toml", ["--archive", str(tmp_path / "archive")]
+    table(np.random.default_rng(8), units="AB").to_csv(path, index=False)
+    limits.write_text('name = "wide"\n[figures]\nzero_g_offset_mg = { max = 50.0, unit = "mg" }\n')
+    command(["import", str(path), *words])
+    command(["fit", "--limits", str(limits), *words])
+    assert "yield   all 100 %, import 100 %" in command(["audit", *words]).stdout
 
 
 @pytest.mark.parametrize("last", ["dwells.parquet", "dwells.json", "run.json"])
