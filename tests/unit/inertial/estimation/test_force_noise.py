@@ -9,6 +9,7 @@ from made_worlds import HIDDEN, NOISES, NULLS, Noise, World, run_of
 
 from inertial.criticism.examination import ExaminedRun
 from inertial.estimation.force_noise import by_force
+from pipelines.diagnosis.result_rows import noise_along
 
 SEED = 5_700_400
 
@@ -30,6 +31,10 @@ def test_noise_that_grows_with_the_force_is_found_in_its_size(power):
     assert found is not None
     ratio = found / (true / np.sqrt(np.mean(true**2, axis=1, keepdims=True)))
     assert np.all(np.abs(np.log(ratio[true > 0.5 * true.max()])) < 0.25)
+    run.louder = found
+    assert noise_along(run)
+    run.louder = found**0.01  # of so many units that two per cent are significant
+    assert not noise_along(run)
 
 
 @pytest.mark.parametrize(
