@@ -10,6 +10,7 @@ import numpy as np
 from inertial import frames
 from inertial.arrays import Array, Places
 from inertial.errors import MissingInput
+from inertial.quantities import column_of
 
 _REMEMBERED = 3_000_000
 """Largest number of values that a state remembers of operators with memory."""
@@ -98,7 +99,7 @@ class State:
         """The array of a quantity, or :class:`MissingInput` naming the effect that needs it."""
         value = self.covariates.get(quantity) if quantity in self.covariates else getattr(self, quantity, None)
         if value is None:
-            raise MissingInput(effect, quantity)
+            raise MissingInput(effect, column_of(quantity))
         return value
 
     def along(self, axis: int) -> Array:
@@ -172,7 +173,7 @@ class State:
 
         def run() -> Array:
             if self.temperature is None:
-                raise MissingInput(str(key[0]), "temperature (unit_C)")
+                raise MissingInput(str(key[0]), "unit_C")
             if self.history is None:
                 return operator(self.time, self.temperature)
             return _at_dwells(self.history.time, operator(self.history.time, self.history.temperature), self.time)
