@@ -10,6 +10,7 @@ import pytest
 from in_process import command
 from numpy.typing import NDArray
 
+from inertial.effects import additions_forgotten
 from inertial.frames import force_from_angles
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
@@ -17,7 +18,7 @@ from pipelines.archive import Archive
 from pipelines.diagnosis.import_document import import_document
 from pipelines.importers.keep import complete_table
 from pipelines.integrity import verify
-from pipelines.jobs.model_change import ModelChange
+from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.rerun.imported_fit import fit_document
 from pipelines.rerun.rerun import again
 from pipelines.stages.fit import fit
@@ -215,6 +216,41 @@ def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None
     assert run.table("dwells")["out_x"].max() < 2e-3
     assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3, 3]
     assert run.about["name"] == "dwells of A, B, C, …"
+
+
+GLUE = """
+from inertial.effects import SensorEffect
+from inertial.effects.base import stack
+
+
+class Glue(SensorEffect):
+    \"\"\"Glue.\"\"\"
+
+    id = "glue"
+    symbol = equation = source = breaker = "k"
+    coefficients = ("k",)
+    typical_ug = (1.0, 100.0)
+
+    def columns(self, state, axis, **nonlinear):
+        return stack(state, [state.along(axis) ** POWER])
+"""
+
+
+def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(tmp_path: Path) -> None:
+    """The archive had the coefficients of the earlier file below the verdict on the later one."""
+    path, archive = tmp_path / "lot.csv", Archive(str(tmp_path / "archive"))
+    table(np.random.default_rng(8)).to_csv(path, index=False)
+    imported = import_document([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)["run"]
+    runs: list[str] = []
+    for power in (2, 3, 3):
+        own = tmp_path / f"glue_{len(runs)}.py"
+        own.write_text(GLUE.replace("POWER", str(power)), encoding="utf-8")
+        with additions_forgotten():
+            change = change_from_options(",".join((*PLAIN, "glue")), effect_files=[own], where="fit")
+            runs.append(again(archive, imported, change).new)
+    assert runs[0] != runs[1] == runs[2]
+    squared, cubed = (archive.run(name).table("coefficients").query("effect == 'glue'")["value"] for name in runs[:2])
+    assert not np.allclose(squared, cubed)
 
 
 def test_the_yield_of_an_import_is_that_of_imports(tmp_path: Path) -> None:
