@@ -15,6 +15,7 @@ class UnknownEffect(InertialError):
         self.name = name
         self.close = tuple(get_close_matches(name, list(known), n=3, cutoff=0.5))
         hint = f"did you mean {' or '.join(self.close)}" if self.close else "see the catalogue of effects for the ids"
+        hint += "; one of a Python file needs --effect-file FILE.py, or to be installed as a package"
         super().__init__(f"effects: unknown effect '{name}'; an id of the catalogue is needed; {hint}")
 
 

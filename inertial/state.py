@@ -173,7 +173,7 @@ class State:
 
         def run() -> Array:
             if self.temperature is None:
-                raise MissingInput(str(key[0]), "temperature (unit_C)")
+                raise MissingInput(str(key[0]), "unit_C")
             if self.history is None:
                 return operator(self.time, self.temperature)
             return _at_dwells(self.history.time, operator(self.history.time, self.history.temperature), self.time)

@@ -166,16 +166,12 @@ def factor_of(effects: Sequence[str], conditions: Conditions) -> Callable[[Array
         for effect, names, part in owned:
             changed = values[part]
             if changes and any(name in changes for name in names):
-                changed = _times(changed, [changes.get(name, np.ones(1)) for name in names], count)
+                ratios = [changes.get(name, np.ones(1)) for name in names]
+                changed = np.stack([v * ratio * np.ones(count) for v, ratio in zip(changed, ratios, strict=True)])
             out = out * effect.factor(conditions, changed)
         return out
 
     return product
-
-
-def _times(values: Array, ratios: Sequence[Array], count: int) -> Array:
-    """Values (p, …, 1) of parameters at each of ``count`` points, (p, …, count)."""
-    return np.stack([value * ratio * np.ones(count) for value, ratio in zip(values, ratios, strict=True)])
 
 
 def fit_transfer(

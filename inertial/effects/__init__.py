@@ -33,6 +33,7 @@ __all__ = [
     "register",
 ]
 
+OF_A_FILE = "tumbleline_effect_"  # begins the name of the module of a user's file
 _extra: dict[str, AnyEffect] = {}
 
 
@@ -134,7 +135,7 @@ def add_file(path: str | Path) -> list[str]:
         methods raise or return later is refused in the same way, see :mod:`inertial.effects.own_file`.
     """
     source = Path(path)
-    spec = importlib.util.spec_from_file_location(f"tumbleline_effect_{source.stem}", source)
+    spec = importlib.util.spec_from_file_location(f"{OF_A_FILE}{source.stem}", source)
     if spec is None or spec.loader is None or not source.is_file():
         raise BrokenEffect(
             f"effect file {source}: no such Python file; give the path of a .py file that defines an effect"

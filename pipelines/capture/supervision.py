@@ -168,7 +168,8 @@ class Supervisor:
                 self.note("resumed", record, f"absent for {rules.clear_s:g} s", "soaked again, then measured", figures)
                 return
             if now - start > rules.limit_s:
-                raise StillSuspended(f"paused for {_long(now - start)}", why)
+                long = f"{now - start:.0f} s" if now - start < 600.0 else f"{(now - start) / 60.0:.0f} min"
+                raise StillSuspended(f"paused for {long}", why)
             clock.sleep(rules.poll_s)
 
     def raise_operator_cause(self, problem: StationError) -> None:
@@ -223,11 +224,6 @@ def short_of_samples(counts: dict[int, int], overflow: set[int], duration: float
     more = f" (and {len(short) - 1} more slots)" if len(short) > 1 else ""
     what = "samples lost in the reader's memory" if slot in overflow else f"{short[slot]} samples of {expected}"
     return [Reason("samples", f"slot {slot}: {what}, all are needed{more}", tuple(short))]
-
-
-def _long(seconds: float) -> str:
-    """A time in seconds, from ten minutes on in minutes."""
-    return f"{seconds:.0f} s" if seconds < 600.0 else f"{seconds / 60.0:.0f} min"
 
 
 OFF_S = "off_s"

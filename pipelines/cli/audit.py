@@ -100,7 +100,8 @@ def _show(audited: "Audit", audit_findings: "list[AuditFinding]", root: str, pag
     say(f"{counted}; {period}")
     shares: list[Any] = [share for share in audited.yields if share.of in {"all", "station"} and share.total]
     if shares:
-        say(f"yield   {', '.join(f'{share.name} {short(100.0 * share.interval.value)} %' for share in shares)}")
+        named = [(share.name or "import", short(100.0 * share.interval.value)) for share in shares]
+        say(f"yield   {', '.join(f'{name} {value} %' for name, value in named)}")
     say(_certificates(audited))
     for who, words in WHO.items():
         of_one = [finding for finding in audit_findings if finding.who == who]

@@ -44,7 +44,7 @@ SETTINGS = {
 
 
 def command(
-    file: Annotated[Path, argument("FILE", "Raw output over time, with a column of temperature.")],
+    file: Annotated[Path, argument("FILE", "Raw output over time; the temperature as unit_C.")],
     calibration: options.CalibrationArgument = "latest",
     output: Annotated[
         Path | None, option("--output -o FILE", "Corrected samples, as .csv or .parquet; -: as CSV on standard output.")

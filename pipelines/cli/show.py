@@ -217,11 +217,8 @@ def _state(calibration: Calibration, day: str) -> str:
 
 
 def _why(calibration: Calibration) -> str:
-    return (
-        calibration.ended_by.reason or f"by {calibration.ended_by.certificate}"
-        if calibration.ended_by
-        else calibration.event.reason
-    )
+    end = calibration.ended_by
+    return end.reason or f"by {end.certificate}" if end else calibration.event.reason
 
 
 NOT_NEEDED = (

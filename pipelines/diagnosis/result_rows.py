@@ -41,6 +41,7 @@ _ALIKE = 0.5
 
 _ACROSS, _ALONG = 0.3, 0.9
 """Forces along the axis, g, below and above which the noise of its dwells is averaged for comparison."""
+_MATERIAL = 1.1  # ratio of these noises below which no notice is given: to two digits it reads 1
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,8 @@ def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, tuple[dict[str, Any], 
 
 def _class(named: Named, names: Names) -> EffectClassDocument:
     group = named.effects
-    proposed = group.proposed
-    scope = group.scope
+    proposed, scope = group.proposed, group.scope
+    low, high = proposed.effect.typical_ug
     row: EffectClassDocument = {
         "effects": list(group.ids),
         "scope": scope,
@@ -108,7 +109,7 @@ def _class(named: Named, names: Names) -> EffectClassDocument:
         "size_ug": MICRO * group.size,
         "nonlinear": {} if scope == "data" else dict(proposed.values),
         "nonlinear_of": None if scope == "data" or not proposed.values else proposed.effect.id,
-        "plausible": _plausible(group.size, proposed.effect.typical_ug),
+        "plausible": group.size <= 0.0 or 0.1 * low <= MICRO * group.size <= high,  # within the noise it is not judged
         "influence": _dwells(named.carried, names),
         "without_influence": without_influence(named.carried),
     }
@@ -260,9 +261,9 @@ def noise_along(run: ExaminedRun) -> list[str]:
         return []
     force = np.broadcast_to(run.lot.state.force, (*run.louder.shape[:2], 3))[..., list(run.lot.state.axes)]
     across, along = (run.louder[part] for part in (np.abs(force) < _ACROSS, np.abs(force) > _ALONG))
-    if not (across.size and along.size):
+    ratio = float(np.sqrt(np.mean(along**2) / np.mean(across**2))) if across.size and along.size else 1.0
+    if max(ratio, 1.0 / max(ratio, 1e-9)) < _MATERIAL:
         return []
-    ratio = float(np.sqrt(np.mean(along**2) / np.mean(across**2)))
     along_gravity = ratio > 1.0
     larger, smaller = ("along", "across") if along_gravity else ("across", "along")
     cause = (
@@ -283,12 +284,6 @@ def noise_of_the_lot(model: Model, units: int) -> list[str]:
     shared, single = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (common, 1.0 - common))
     text = f"{shared} µg of the residual are common to all {units} units, {single} µg differ between them"
     return [f"{text}: look for a cause that they share, such as table, fixture, reference or supply"]
-
-
-def _plausible(size: float, typical: tuple[float, float]) -> bool:
-    """Whether a size, g, is in the usual range of the effect, extended downwards by a factor of ten."""
-    # a size of zero (within the noise) is not judged
-    return size <= 0.0 or 0.1 * typical[0] <= MICRO * size <= typical[1]
 
 
 def suspected_of(diagnosis: Diagnosis) -> SuspectedEffects | None:

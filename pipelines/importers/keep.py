@@ -77,7 +77,7 @@ def keep_table_of_dwells(
         digest.update(table.to_csv(index=False).encode())
     serials = list(dict.fromkeys(dwells["unit"].astype(str)))
     about: dict[str, Any] = {
-        "name": f"dwells of {', '.join(serials[:3])}",
+        "name": f"dwells of {', '.join(serials[:3])}{', …' * (len(serials) > 3)}",
         "lot": lot_of_import(serials, dwells, device),
         "remarks": [],
     }
@@ -133,8 +133,9 @@ def keep(
     if references is not None:
         parameters["references"] = references.model_dump(mode="json")
     about: dict[str, Any] = {
-        "name": f"import of {', '.join(data.units[:3])}", "source": source.as_dict(), "mapping": parameters["mapping"],
-        "remarks": list(data.remarks), "lot": lot_of_import(data.units, data.dwells, how.device),
+        "name": f"import of {', '.join(data.units[:3])}{', …' * (len(data.units) > 3)}",
+        "source": source.as_dict(), "mapping": parameters["mapping"], "remarks": list(data.remarks),
+        "lot": lot_of_import(data.units, data.dwells, how.device),
     }  # fmt: skip
     if judged is not None and judged.effects:
         model = {"effects": list(judged.effects), "formulas": [], "model_name": "", "model_version": 0}

@@ -111,15 +111,12 @@ def effect_views(diagnosis: Diagnosis, units: tuple[str, ...], held: str = "") -
     after = residuals_of_model(final, len(units))
     views: list[EffectView] = []
     for term in terms:
-        without = diagnosis.base if len(terms) == 1 and not held else _without(final, term)
+        without = diagnosis.base
+        if len(terms) > 1 or held:  # the other missing effects, at the noise of the model with all
+            without = Model(final.problem, final.without_term(term).terms, known=[final.noise])
         before = residuals_of_model(without, len(units))
         views.append(_view(problem, term, units, (before, after), floor))
     return sorted(views, key=lambda view: -view.fall)[:MOST_VIEWS]
-
-
-def _without(final: Model, term: Term) -> Model:
-    """The model with the other missing effects, at the noise of the model with all."""
-    return Model(final.problem, final.without_term(term).terms, known=[final.noise])
 
 
 def _view(

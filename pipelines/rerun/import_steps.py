@@ -1,13 +1,17 @@
 """The stages of the chain for a run of imported dwells, as far as what was imported with them allows."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from inertial import effects
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.archive import Run, code_hash
+from pipelines.archive import Run, code_hash, files
+from pipelines.archive.keys import digest
 from pipelines.chain.chain import BY_NAME, Tables
 from pipelines.importers.mapping import OUTPUT_UNITS
 from pipelines.importers.plane import plane_answer
@@ -86,7 +90,14 @@ def _call(
     stage: str, inputs: tuple[str, ...], parameters: dict[str, Any], call: Callable[[Run], Tables], code: str = ""
 ) -> StageCall:
     """A call of a stage of the chain; ``code`` names its code where it is not that of the stage."""
-    return StageCall(stage, inputs, BY_NAME[stage].outputs, parameters, code_hash(code or stage), call)
+    return StageCall(stage, inputs, BY_NAME[stage].outputs, parameters, code_of(code or stage, parameters), call)
+
+
+def code_of(result: str, parameters: dict[str, Any]) -> str:
+    """Hash of the code of a stage, and of the Python files (``--effect-file``) of the effects that it is called with."""
+    modules = {type(effects.get(name)).__module__ for name in parameters.get("effects", ())}
+    own = sorted(str(sys.modules[name].__file__) for name in modules if name.startswith(effects.OF_A_FILE))
+    return digest([code_hash(result), *(files.sha256(Path(path)) for path in own)]) if own else code_hash(result)
 
 
 def import_step(data: ImportedData, left_out: Dwells, old: Run) -> StageCall:

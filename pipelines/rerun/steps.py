@@ -8,7 +8,7 @@ import pandas as pd
 from pydantic import ValidationError
 
 from inertial.quantities import FORCE_COLUMNS
-from pipelines.archive import Archive, Run, code_hash
+from pipelines.archive import Archive, Run
 from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import RECORDS, STAGES, Tables
 from pipelines.chain.runner import captured_tables
@@ -23,6 +23,7 @@ from pipelines.rerun.import_steps import (
     ImportedData,
     StageCall,
     budget_step,
+    code_of,
     fit_step,
     grade_step,
     has_poses,
@@ -144,7 +145,8 @@ def _captured(run: Run, change: ModelChange) -> Plan:
     for stage in STAGES:
         if stage.name == "soak_noise" and not complete and stage.outputs[0] not in run.tables():
             continue  # a run of an earlier version whose samples are gone
-        parameters, code, call = stage.parameters(job), code_hash(stage.name), partial(stage.call, job)
+        parameters, call = stage.parameters(job), partial(stage.call, job)
+        code = code_of(stage.name, parameters)
         steps.append(StageCall(stage.name, stage.inputs, stage.outputs, parameters, code, call))
     decisive = {key: value for key, value in job.about.items() if key != "station"}
     return Plan(job.recipe.name, tuple(steps), job.about, {**decisive, "code": {s.name: s.code for s in steps[1:]}})

@@ -161,10 +161,6 @@ def _coefficient(row: Row) -> content.Coefficient:
     return content.Coefficient(**values, unit=row["unit_text"])
 
 
-def _quantity(row: Row) -> str:
-    return QUANTITIES.get(row["quantity"], str(row["quantity"]))
-
-
 def _of_axes(text: str, letters: str) -> str:
     """A text about the norm of gravity, adapted to a device with these axes."""
     for old, new in OF_FEWER_AXES.items() if len(letters) < len(AXES) else ():
@@ -181,7 +177,7 @@ def _result(row: Row, coefficients: list[content.Coefficient]) -> content.Result
     bare = row["quantity"] in {"output", "scale"} and not scale
     letters = letters_of(coefficients)
     return content.Result(
-        quantity=_of_axes(_quantity(row), letters),
+        quantity=_of_axes(QUANTITIES.get(row["quantity"], str(row["quantity"])), letters),
         axis=letters if row["axis"] == "norm" and len(letters) < len(AXES) else row["axis"],
         unit=unit,
         value=None if bare else value,

@@ -21,7 +21,7 @@ SUFFIX = ".h"
 FEWER_AXES = True
 
 _PACKED = {"double": "d", "float": "f", "q24": "i"}
-_TAKEN = {"calibration", "correct", "crc32", "crc32_number", "from_counts", "intact", "product"}
+_TAKEN = {"calibration", "correct", "crc32", "crc32_number", "from_counts", "intact", "limited", "product"}
 _COUNTS_BITS = 48  # of the factor from counts to fixed point
 
 

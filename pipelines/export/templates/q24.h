@@ -22,16 +22,24 @@ typedef struct {
 @UNITS@
 
 @CHECKSUM@
-/* The output in units of 2^-24 g, for a device whose output is in counts (@OUT_UNIT@). */
+/* What is beyond +-128 g becomes +-128 g. */
+static inline int32_t tumbleline_limited(int64_t value)
+{
+    return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
+}
+
+/* The output in units of 2^-24 g, for a device whose output is in counts (@OUT_UNIT@), limited to +-128 g. */
 static inline int32_t tumbleline_from_counts(const tumbleline_calibration *c, int32_t counts)
 {
-    return (int32_t)(((int64_t)counts * c->per_count + ((int64_t)1 << 23)) >> 24);
+    int64_t high = counts * (c->per_count >> 24), low = counts * (c->per_count & 0xFFFFFF);
+    return tumbleline_limited(high + ((low + ((int64_t)1 << 23)) >> 24));
 }
 
 static inline int64_t tumbleline_product(int64_t a, int64_t b) { return (a * b + ((int64_t)1 << 23)) >> 24; }
 
 /* Writes the specific force in units of 2^-24 g to force[3]; output in the same units, temperature in thousandths of a degree.
- * Returns 0, or 1 where the temperature is beyond low_mC to high_mC: force is then that of the nearest temperature. */
+ * Returns 0, or 1 where the temperature is beyond low_mC to high_mC: force is then that of the nearest temperature.
+ * A force beyond +-128 g is limited. */
 static inline int tumbleline_correct(const tumbleline_calibration *c, const int32_t output[3], int32_t temperature_mC,
                                      int32_t force[3])
 {
@@ -49,7 +57,7 @@ static inline int tumbleline_correct(const tumbleline_calibration *c, const int3
             for (int n = @ORDER@ - 2; n >= 0; n--) m = c->inverse[n][i][j] + tumbleline_product(m, x);
             sum += m * d[j];
         }
-        force[i] = (int32_t)((sum + ((int64_t)1 << 23)) >> 24);
+        force[i] = tumbleline_limited((sum + ((int64_t)1 << 23)) >> 24);
     }
     return t != temperature_mC;
 }

@@ -42,10 +42,11 @@ def two_models(request: Request) -> Response:
     table = next(
         (diagnosed.table for diagnosed in found if diagnosed is not None and diagnosed.table is not None), None
     )
+    shown = sorted(rows or (), key=lambda row: not np.isfinite(row["change"]))[:MOST]  # what one alone has comes last
     return page(
-        request, "two_models.html", state, problems, sides=sides, found=found, effects=_lacking(sides), waiting=waiting,
-        names=NAMES,
-        rows=None if rows is None else [_worded(row, sides) for row in _ordered(rows)[:MOST]], count=len(rows or ()),
+        request, "two_models.html", state, problems, sides=sides, found=found, waiting=waiting, names=NAMES,
+        effects=[name for name in effects.catalogue() if sides and name not in sides[-1].judged],
+        rows=None if rows is None else [_worded(row, sides) for row in shown], count=len(rows or ()),
         sources=sources.sources(bench.settings), models=models.models(bench.settings), offered=_offered(state, found),
         against=_quantity(state, found), drivers=[] if table is None else [(k, label) for k, (label, _) in table.drivers.items()],
         units=() if table is None else table.units, unit="" if table is None else table.units[table.index_of(state.unit)],
@@ -80,16 +81,6 @@ def _chart(bench: Workbench, state: TwoModelsPage) -> Chart | None:
         )
     quantity = _quantity(state, found)
     return quantity_chart(second, first.residual, quantity, first.index_of(state.unit), names=NAMES)
-
-
-def _lacking(sides: tuple[MissingPage, ...]) -> list[str]:
-    """The effects of the catalogue that the second model lacks."""
-    return [name for name in effects.catalogue() if sides and name not in sides[-1].judged]
-
-
-def _ordered(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Coefficients of both models before those that only one has."""
-    return sorted(rows, key=lambda row: not np.isfinite(row["change"]))
 
 
 def _worded(row: dict[str, Any], sides: tuple[MissingPage, ...]) -> dict[str, Any]:

@@ -46,10 +46,8 @@ def upload(request: Request) -> Response:
 
 
 def _largest(dwells: Iterable[Mapping[str, Any]]) -> float:
-    return max(
-        (abs(float(row[f"out_{axis}"])) for row in dwells for axis in AXES if math.isfinite(row[f"out_{axis}"])),
-        default=0.0,
-    )
+    values = (abs(float(row[f"out_{axis}"])) for row in dwells for axis in AXES)
+    return max(filter(math.isfinite, values), default=0.0)
 
 
 def _level(largest: float, value: float) -> str:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from pipelines.archive import Archive, files
@@ -29,6 +30,7 @@ PAUSED = "paused"
 NEWEST = 12
 TOLD = ("done", "total", "note", "question", "number", "problem", "run", "since")
 """What the process of a lot tells of its state, by the names of :class:`LotState`."""
+_STARTING = Lock()  # two pages that start at once
 SAFE_S, POLL_S = 20.0, 0.1
 """Time that the processes of lots are given at the end of the server, and how often they are looked at, s."""
 
@@ -91,28 +93,31 @@ def start(settings: WorkbenchSettings, lot_request: Request) -> LotState:
         "seats": [[u.slot, u.serial] for u in job.lot.units],
     }
     name = digest(content)[:12]
-    for other in lots(settings):
-        if not other.ended and other.id != name and other.station == str(lot_request.station or ""):
-            raise WrongUse(
-                f"lot: the station has lot {other.id} ({other.phase}), one lot at a time is possible; finish or stop that one "
-                "first"
-            )
-    folder = settings.folder / FOLDER / name
-    known = state_of(folder) if (folder / "state.json").is_file() else None
-    if known is not None and not known.idle:
-        return known
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / PAUSED).unlink(missing_ok=True)
-    for old in folder.glob("answer-*.json"):
-        old.unlink()
-    files.publish(folder / "request.json", files.json_bytes(content), "lot", files.ELSEWHERE)
-    write_state(folder, {"phase": "starting", "since": time.time(), "number": 0 if known is None else known.number})
-    with (folder / "log.txt").open("ab") as log:
-        subprocess.Popen(  # noqa: S603 - our own interpreter and module
-            [sys.executable, "-m", "pipelines.workbench.services.lot_process", str(folder)],
-            stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
-        )  # fmt: skip
-    return state_of(folder)
+    with _STARTING:
+        for other in lots(settings):
+            if not other.ended and other.id != name and other.station == str(lot_request.station or ""):
+                raise WrongUse(
+                    f"lot: the station has lot {other.id} ({other.phase}), one lot at a time is possible; finish or stop "
+                    "that one first"
+                )
+        folder = settings.folder / FOLDER / name
+        known = state_of(folder) if (folder / "state.json").is_file() else None
+        if known is not None and not known.idle:
+            return known
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / PAUSED).unlink(missing_ok=True)
+        for old in folder.glob("answer-*.json"):
+            old.unlink()
+        files.publish(folder / "request.json", files.json_bytes(content), "lot", files.ELSEWHERE)
+        now = {"phase": "starting", "since": time.time(), "number": 0 if known is None else known.number}
+        write_state(folder, now)
+        with (folder / "log.txt").open("ab") as log:
+            process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
+                [sys.executable, "-m", "pipelines.workbench.services.lot_process", str(folder)],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
+            )  # fmt: skip
+        write_state(folder, now | {"pid": process.pid})  # so that it can be stopped before it tells of itself
+        return state_of(folder)
 
 
 def again(settings: WorkbenchSettings, name: str) -> LotState:

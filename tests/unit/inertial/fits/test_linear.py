@@ -61,8 +61,9 @@ def test_level_of_the_table_is_found_from_the_whole_lot(rng):
 @each(
     [
         ("slot_rotation", NotIdentified, "slot_rotation"),  # the plan makes it one with misalignment
-        ("supply_sensitivity", MissingInput, "supply"),
+        ("supply_sensitivity", MissingInput, "no supply_V;"),
         ("third_oder", UnknownEffect, "third_order"),
+        ("my_glue", UnknownEffect, "--effect-file"),  # of the model of a run, say
     ]
 )
 def test_refusals_name_what_is_confused_missing_or_meant(row, rng):

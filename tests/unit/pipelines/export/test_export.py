@@ -268,7 +268,7 @@ def test_fixed_point_of_fewer_axes_has_their_scale_and_takes_forces_for_the_othe
         assert np.abs(made.correct(output, temperature) - whole.correct(output, temperature)).max() < 1e-6
 
 
-def test_compiled_fixed_point_beyond_its_temperatures_holds_the_nearest_one_and_says_so(tmp_path: Path) -> None:
+def test_compiled_fixed_point_beyond_its_temperatures_and_128_g_holds_the_nearest_one(tmp_path: Path) -> None:
     """The program of the test ends with 4 where the function does not tell that the temperature was beyond the range."""
     c = unit(scale_t=1e-3)
     header = export_text("c", [c], "run-1", ExportSettings(arithmetic="q24"))
@@ -279,6 +279,8 @@ def test_compiled_fixed_point_beyond_its_temperatures_holds_the_nearest_one_and_
     assert np.array_equal(computed[3:], np.repeat(computed[3:4], 3, axis=0))
     edges = np.array([c.correct(output[None], t)[0] for t in c.temperatures])
     assert np.max(np.abs(computed[[0, 3]] - edges)) < 8.0 * (1e-6 * stated_ug(header) + 2e-7)
+    (far,) = compiled(header, FIXED, np.array([(2.0**31 - 1.0, -(2.0**31), 0.0, 20.0)]), tmp_path)
+    assert far[:2] == pytest.approx([128.0, -128.0], rel=0.02)  # and not of the other sign
 
 
 @pytest.mark.parametrize("full_scale", [2.0, 8.0])

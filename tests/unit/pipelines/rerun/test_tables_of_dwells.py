@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from in_process import command
 from numpy.typing import NDArray
 
+from inertial.effects import additions_forgotten
 from inertial.frames import force_from_angles
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
@@ -16,7 +18,7 @@ from pipelines.archive import Archive
 from pipelines.diagnosis.import_document import import_document
 from pipelines.importers.keep import complete_table
 from pipelines.integrity import verify
-from pipelines.jobs.model_change import ModelChange
+from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.rerun.imported_fit import fit_document
 from pipelines.rerun.rerun import again
 from pipelines.stages.fit import fit
@@ -208,13 +210,59 @@ def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
 
 def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None:
     path = tmp_path / "lot.csv"
-    table(np.random.default_rng(8)).assign(slot=3).to_csv(path, index=False)
+    table(np.random.default_rng(8), units="ABCD").assign(slot=3).to_csv(path, index=False)
     with pytest.raises(WrongUse, match=r"takes --unit-of output=… and --device alone \(found local_gravity_m_s2\)"):
         import_document([path], {"local_gravity_m_s2": 9.8}, "", "", str(tmp_path / "archive"), None, nullcontext)
     done = import_document([path], {"units": {"output": "mg"}}, "", "", str(tmp_path / "archive"), None, nullcontext)
     run = Archive(str(tmp_path / "archive")).run(done["run"])
     assert run.table("dwells")["out_x"].max() < 2e-3
-    assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3]
+    assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3, 3]
+    assert run.about["name"] == "dwells of A, B, C, …"
+
+
+GLUE = """
+from inertial.effects import SensorEffect
+from inertial.effects.base import stack
+
+
+class Glue(SensorEffect):
+    \"\"\"Glue.\"\"\"
+
+    id = "glue"
+    symbol = equation = source = breaker = "k"
+    coefficients = ("k",)
+    typical_ug = (1.0, 100.0)
+
+    def columns(self, state, axis, **nonlinear):
+        return stack(state, [state.along(axis) ** POWER])
+"""
+
+
+def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(tmp_path: Path) -> None:
+    """The archive had the coefficients of the earlier file below the verdict on the later one."""
+    path, archive = tmp_path / "lot.csv", Archive(str(tmp_path / "archive"))
+    table(np.random.default_rng(8)).to_csv(path, index=False)
+    imported = import_document([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)["run"]
+    runs: list[str] = []
+    for power in (2, 3, 3):
+        own = tmp_path / f"glue_{len(runs)}.py"
+        own.write_text(GLUE.replace("POWER", str(power)), encoding="utf-8")
+        with additions_forgotten():
+            change = change_from_options(",".join((*PLAIN, "glue")), effect_files=[own], where="fit")
+            runs.append(again(archive, imported, change).new)
+    assert runs[0] != runs[1] == runs[2]
+    squared, cubed = (archive.run(name).table("coefficients").query("effect == 'glue'")["value"] for name in runs[:2])
+    assert not np.allclose(squared, cubed)
+
+
+def test_the_yield_of_an_import_is_that_of_imports(tmp_path: Path) -> None:
+    """It has no station, whose name would stand there."""
+    path, limits, words = tmp_path / "lot.csv", tmp_path / "limits.toml", ["--archive", str(tmp_path / "archive")]
+    table(np.random.default_rng(8), units="AB").to_csv(path, index=False)
+    limits.write_text('name = "wide"\n[figures]\nzero_g_offset_mg = { max = 50.0, unit = "mg" }\n')
+    command(["import", str(path), *words])
+    command(["fit", "--limits", str(limits), *words])
+    assert "yield   all 100 %, import 100 %" in command(["audit", *words]).stdout
 
 
 @pytest.mark.parametrize("last", ["dwells.parquet", "dwells.json", "run.json"])

@@ -6,10 +6,12 @@ import re
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib.resources import files
 from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -130,7 +132,7 @@ def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: WorkbenchSet
 @pytest.fixture
 def two(settings: WorkbenchSettings, monkeypatch: pytest.MonkeyPatch) -> WorkbenchSettings:
     """Two stations; the processes that would measure are not started."""
-    monkeypatch.setattr(lots.subprocess, "Popen", lambda *_, **__: None)
+    monkeypatch.setattr(lots.subprocess, "Popen", lambda *_, **__: SimpleNamespace(pid=0))
     text = (files("stations") / "simulated.toml").read_text(encoding="utf-8")
     settings.folder.mkdir(parents=True)
     places = [settings.folder / f"{name}.station" for name in ("left", "right")]
@@ -153,6 +155,24 @@ def test_each_station_measures_one_lot_at_a_time(two: WorkbenchSettings) -> None
     assert station_named(stations_of(two), "") == left
     with pytest.raises(WrongUse, match="middle"):
         station_named(stations_of(two), "middle")
+
+
+def test_a_lot_that_two_pages_start_at_once_has_one_process_which_can_be_stopped(
+    two: WorkbenchSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    station, recipe = stations_of(two)[0], recipe_file(two.folder)
+    begun: list[int] = []
+
+    def slowly(*_: object, **__: object) -> SimpleNamespace:
+        time.sleep(0.2)
+        begun.append(os.getpid())
+        return SimpleNamespace(pid=begun[-1])
+
+    monkeypatch.setattr(lots.subprocess, "Popen", slowly)
+    with ThreadPoolExecutor(3) as pages:
+        states = list(pages.map(lambda _: lots.start(two, Request(recipe, station.file, ("A1",), (0,))), range(3)))
+    assert len(begun) == 1
+    assert {state.pid for state in states} == set(begun)
 
 
 def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: WorkbenchSettings) -> None:
