@@ -41,7 +41,6 @@ _ALIKE = 0.5
 
 _ACROSS, _ALONG = 0.3, 0.9
 """Forces along the axis, g, below and above which the noise of its dwells is averaged for comparison."""
-_MATERIAL = 1.1  # ratio of these noises below which no notice is given: to two digits it reads 1
 
 
 @dataclass(frozen=True)
@@ -261,9 +260,9 @@ def noise_along(run: ExaminedRun) -> list[str]:
         return []
     force = np.broadcast_to(run.lot.state.force, (*run.louder.shape[:2], 3))[..., list(run.lot.state.axes)]
     across, along = (run.louder[part] for part in (np.abs(force) < _ACROSS, np.abs(force) > _ALONG))
-    ratio = float(np.sqrt(np.mean(along**2) / np.mean(across**2))) if across.size and along.size else 1.0
-    if max(ratio, 1.0 / max(ratio, 1e-9)) < _MATERIAL:
+    if not (across.size and along.size):
         return []
+    ratio = float(np.sqrt(np.mean(along**2) / np.mean(across**2)))
     along_gravity = ratio > 1.0
     larger, smaller = ("along", "across") if along_gravity else ("across", "along")
     cause = (
