@@ -100,7 +100,7 @@ def looks_of(problem: Problem) -> list[Driver]:
     for name, values in (("unit_C", state.temperature), ("time_s", state.time)):
         if values is not None and varies(values):
             looks.append(Driver(name, partial(_across_axes, problem, values), part="axes"))
-    if state.temperature is not None and varies(state.temperature):
+    if state.temperature is not None and varies(state.temperature) and varies(own_forces(problem)):
         looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), part="transfer"))
     return looks
 

@@ -85,7 +85,8 @@ def suspects(problem: Problem) -> list[Driver]:
                 suspected.append(Driver(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
     if not problem.lot.radial:
         force = own_forces(problem).reshape(problem.blocks, problem.n)
-        suspected.append(Driver("pose", _columns(curve(force, _KNOTS)), _unit_range(force)))
+        if varies(force):
+            suspected.append(Driver("pose", _columns(curve(force, _KNOTS)), _unit_range(force)))
         suspected += _table(problem)
     duration = max(float(np.ptp(state.time)), 1.0)
     return [*suspected, *(_oscillation(problem, duration / cycles) for cycles in _CYCLES)]
@@ -113,8 +114,9 @@ def wide_suspects(problem: Problem) -> list[Driver]:
         changes = np.broadcast_to(turned, (problem.blocks // problem.per_unit, *turned.shape[1:]))
         columns = by_block(of_outputs(problem.lot, changes.reshape(*changes.shape[:3], -1)))
         suspected.append(Driver(name, _columns(columns, shared=True), part="axes"))
-        columns = transfer(of_axes(along, problem.axes, 1), values, _FORCE_KNOTS)
-        suspected.append(Driver(name, _columns(columns), part="transfer"))
+        if varies(own_forces(problem)):
+            columns = transfer(of_axes(along, problem.axes, 1), values, _FORCE_KNOTS)
+            suspected.append(Driver(name, _columns(columns), part="transfer"))
     return suspected
 
 

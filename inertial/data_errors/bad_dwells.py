@@ -167,7 +167,7 @@ class _Deletion:
             every = drop.reshape(self.units, self.axes, self.n).sum(axis=1)
             total, count = float(self.squares.sum()), float(self.dof.sum())
             variance = np.repeat((total - every) / max(count - self.axes, 1.0), self.axes, axis=0)
-        return (drop / np.maximum(variance, 1e-300)).reshape(self.units, self.axes, self.n)
+        return (drop / np.maximum(variance, 1e-200)).reshape(self.units, self.axes, self.n)
 
     def delete(self, unit: int, dwell: int) -> Array:
         """Delete one dwell of a unit and update the statistics; returns its deletion residual, (axes,), g."""

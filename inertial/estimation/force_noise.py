@@ -72,6 +72,8 @@ def by_force(model: Model, soak: Places | None = None) -> Array | None:
         by_axis = left.reshape(units, problem.per_unit, n)
         left = (by_axis - np.median(by_axis[complete], axis=0)).reshape(left.shape)
     along = np.abs(np.swapaxes(force, 1, 2)[:, list(problem.axes)].reshape(problem.blocks, n))
+    if not along.any():
+        return None  # an axis across gravity in every pose
     along = along / float(along.max())
     scale = (covariance.level * model.noise.scale)[:, None] ** 2
     alone = (problem.error / covariance.level[:, None]) ** 2 * scale

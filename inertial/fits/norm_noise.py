@@ -49,7 +49,7 @@ def whitener_of_norms(residual: Array, rows: Array, direction: Array, time: Arra
         q, triangle = np.linalg.qr(h)
         left = z - q @ (q.T @ z)
         volume = np.log(np.diagonal(low)).sum() + np.log(np.abs(np.diagonal(triangle))).sum()
-        return float((residual.size - rows.shape[1]) * np.log(left @ left) + 2.0 * volume)
+        return float((residual.size - rows.shape[1]) * np.log(max(left @ left, 1e-300)) + 2.0 * volume)
 
     best = min(((deviance((f, w)), (f, w)) for f in _SHARES.tolist() for w in _SHARES.tolist()), key=lambda fit: fit[0])
     for step in _FINER:

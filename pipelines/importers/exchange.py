@@ -227,10 +227,12 @@ def _plausible(frame: pd.DataFrame, where: str) -> None:
     if FORCE_COLUMNS[0] in frame.columns:
         size = float(np.median(np.linalg.norm(frame[list(FORCE_COLUMNS)].to_numpy(dtype=np.float64), axis=1)))
         if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
-            raise DataRejected(
-                f"{where}: the reference force has a norm of {size:.4g}, about 1 is needed; give force_x, "
-                "force_y, force_z in g, not m/s² or counts"
+            remedy = (
+                "give force_x, force_y, force_z in g, not m/s² or counts"
+                if size > 0.0
+                else "of an axis across gravity give the force across it, such as force_z = 1"
             )
+            raise DataRejected(f"{where}: the reference force has a norm of {size:.4g}, about 1 is needed; {remedy}")
     _countable(frame, where)
 
 

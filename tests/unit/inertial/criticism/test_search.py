@@ -8,12 +8,16 @@ from inertial.estimation.lot import Lot
 from inertial.state import State
 
 
-def temperature_test(bias: str) -> Lot:
-    """Four devices of one axis over seven soaks: their bias follows the square of the temperature, or jumps from soak to soak."""
+def temperature_test(bias: str, along: tuple[float, ...] = (1.0, -1.0, 0.0)) -> Lot:
+    """Four devices of one axis over seven soaks: their bias follows the square of the temperature, or jumps from soak to soak.
+
+    along : g, force along the axis, dwell after dwell
+    """
     rng, warm = np.random.default_rng(1), np.repeat((-40.0, -10.0, 10.0, 25.0, 40.0, 60.0, 85.0), 6) - 25.0
     n = warm.size
     force = np.zeros((n, 3))
-    force[:, 0] = np.tile((1.0, -1.0, 0.0), n // 3)
+    force[:, 0] = np.resize(along, n)
+    force[:, 2] = np.sqrt(1.0 - force[:, 0] ** 2)
     line, square, gain = (
         4e-5 * rng.normal(size=(4, 1)),
         4e-7 * rng.normal(1.0, 0.2, (4, 1)),
@@ -39,3 +43,10 @@ def test_a_bias_that_follows_a_polynomial_of_the_temperature_is_no_jump_of_every
     polynomial = {"bias_temperature", "bias_temperature_quadratic", "scale_temperature"}
     assert ({"bias_unsteady"} if bias == "jumps" else polynomial) <= told
     assert ("bias_unsteady" in told) is (bias == "jumps")
+
+
+@each([0.0, 1.0])
+def test_an_axis_that_rests_in_one_pose_has_its_bias_over_temperature_named(along: float) -> None:
+    lot = temperature_test("polynomial", (along,))
+    found = diagnose(lot, ("bias", "bias_temperature"), np.random.default_rng(2))
+    assert [{"bias_temperature_quadratic"} <= set(named.effects.ids) for named in found.named] == [True]

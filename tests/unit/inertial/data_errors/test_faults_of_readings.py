@@ -82,3 +82,14 @@ def test_a_tumble_about_one_axis_tells_the_scale(axes: tuple[int, ...]) -> None:
     output = 0.3 * (force + np.array([0.02, -0.03, 0.04]))[..., axes]
     tumble = Readings(force=force, output=output, time=np.arange(24.0)[None], unit_name="V", axes=axes)
     assert tumble.scale == pytest.approx(0.3, rel=0.05)
+
+
+def test_dwells_that_no_other_unit_has_are_no_end_of_a_file() -> None:
+    two = readings(np.random.default_rng(3), units=2)
+    missing = np.zeros(two.time.shape, dtype=bool)
+    missing[0, :40] = missing[1, 56:] = True
+    parts = replace(
+        two, output=np.where(missing[..., None], np.nan, two.output), time=np.where(missing, np.nan, two.time)
+    )
+    assert [fault.name for fault in find_faults(parts) if fault.unit == 0] == []
+    assert [fault.name for fault in find_faults(parts) if fault.unit == 1] == ["truncated_file"]
