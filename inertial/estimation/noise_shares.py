@@ -50,6 +50,10 @@ class Shares(NamedTuple):
         return Shares(flicker * self.flicker, walk * self.walk, of_blocks)
 
 
+_EXACT = 1e-9
+"""Sum of squares of a block fitted exactly, over the pooled variance: rounding."""
+
+
 @dataclass(frozen=True)
 class Noise:
     """Noise of a lot.
@@ -99,15 +103,22 @@ def _deviance_of_equal(squares: Array, dof: Array) -> tuple[float, float]:
 
 def _deviances(squares: Array, dof: Array, priors: tuple[float, ...] = PRIOR_DOF) -> tuple[Array, Array]:
     """−2 log likelihoods at each of the prior degrees of freedom, and the centres of the variances there, (priors,)."""
-    squares, prior = np.maximum(squares, 0.0), np.array(priors)[:, None]
+    pooled = _deviance_of_equal(squares, dof)[1]
+    # a block without any square would draw the centre to zero
+    squares, prior = np.maximum(squares, _EXACT * pooled), np.array(priors)[:, None]
     weight = dof + prior
-    centre = np.full(prior.shape, _deviance_of_equal(squares, dof)[1])
-    for _ in range(60):
-        again = squares.size / np.add.reduce(weight / (squares + prior * centre), axis=1, keepdims=True)
-        near = np.abs(again / centre - 1.0) < 1e-5
-        if near.all():
+    centre = np.full(prior.shape, pooled)
+    for _ in range(
+        60
+    ):  # Newton's steps in the logarithm of the centre: plain repetition creeps where the prior is large
+        both = squares + prior * centre
+        each = weight / both
+        total = np.add.reduce(each, axis=1, keepdims=True)
+        step = np.log(squares.size / (total * centre))
+        if np.all(np.abs(step) < 1e-5):
             break
-        centre = np.where(near, centre, again)
+        share = np.add.reduce(each * squares / both, axis=1, keepdims=True) / total
+        centre = centre * np.exp(np.clip(step / share, -2.0, 2.0))
     terms = weight * np.log(squares + prior * centre) - prior * np.log(prior * centre)
     terms = terms - 2.0 * gammaln(0.5 * weight) + 2.0 * gammaln(0.5 * prior)
     return terms.sum(axis=1), centre[:, 0]
