@@ -37,7 +37,14 @@ nearly one for a static effect, nearly zero for an effect of temperature or time
 _ALIKE = 0.8  # cosine from which on the remainder of one column, known to a few per cent, may be taken for the other
 
 _REMAINDER = 0.03
-"""Share of a named effect's score that can remain, because its column is taken at the middle of its parameters' range."""
+"""Share of a named effect's score that can remain, because products of columns are means over lots."""
+
+_REMAINDER_OF_SHAPE = 0.25
+"""The same where the effect has a time constant or a width, and its column is that of the middle of their range.
+
+Of a creep of 25 s another effect explained 0.13 of its score in 1000 lots (`python -m benchmarks.discovery names --archives 36`). A
+second effect of the same driver below half of the size of the first is named when the first is in the model with its own shape.
+"""
 
 
 @dataclass(frozen=True)
@@ -187,10 +194,11 @@ class Pool:
             yield self._name(driver, sums[driver], effect, scores)
 
     def _already_named(self, found: Sequence[Name], new: Name) -> bool:
-        """Whether a name repeats an earlier one, or is the remainder of one whose column is known to a few per cent."""
+        """Whether a name repeats an earlier one, or is the remainder of one whose column is not exactly that of its effect."""
         effect, driver = new.effects[0], new.drivers[0]
         for name in found:
-            little = new.score < _REMAINDER * name.score
+            inexact = effects_catalogue.get(name.effects[0]).nonlinear
+            little = new.score < (_REMAINDER_OF_SHAPE if inexact else _REMAINDER) * name.score
             cosines = self.lot[np.ix_(self._everywhere(effect), self._everywhere(name.effects[0]))]
             alike = set(new.effects) & set(name.effects) or np.abs(cosines).max() > _ALIKE
             if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):

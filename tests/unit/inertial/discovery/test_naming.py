@@ -28,6 +28,7 @@ HIDDEN = [
     ("cross_coupling", "slot"),
     ("second_order", "radius"),
     ("scale_asymmetry", "mean"),
+    ("creep_after_move", "slot"),
 ]
 
 
