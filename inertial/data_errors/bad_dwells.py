@@ -10,7 +10,7 @@ from inertial.arrays import Array, Flags, Places
 from inertial.data_errors.bad_norms import bad_norms
 from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import BAD_DWELL, COMMON, MOST_BAD
-from inertial.distributions import chi2_upper, f_tail
+from inertial.distributions import chi2_tail, chi2_upper, f_tail
 from inertial.estimation.alternative import poses
 from inertial.estimation.model import Model
 from inertial.estimation.space import Space
@@ -144,8 +144,10 @@ class _Deletion:
         statistic = np.where(self.left_to_poses, 0.0, statistic)
         unit, dwell = np.unravel_index(int(np.argmax(statistic)), statistic.shape)
         dof = float(self.dof.reshape(self.units, -1).min(axis=1)[unit])
-        freedom = self.axes * (dof - 1.0 + min(self.prior, 1e6)) if np.isfinite(self.prior) else float(self.dof.sum())
-        chance = float(f_tail(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
+        most = float(statistic[unit, dwell])
+        freedom = max(float(self.dof.sum()), 1.0)  # of the common variance; deviations over a block's own are normal
+        every = chi2_tail(most, self.axes) if np.isfinite(self.prior) else f_tail(most / self.axes, self.axes, freedom)
+        chance = float(every) * self.looks
         outlier = int(unit), int(dwell), np.sqrt(squares[unit, :, dwell])
         return outlier if chance < BAD_DWELL and dof >= _LEAST_DOF else None
 
@@ -158,15 +160,20 @@ class _Deletion:
         return self._studentised(np.where(self.known, self.left**2 / self.known_size, 0.0))
 
     def _studentised(self, drop: Array) -> Array:
-        """Squares ``drop`` (blocks, n) over a variance estimated without the dwell, (units, axes, n)."""
+        """Squares ``drop`` (blocks, n) over a variance estimated without the dwell, (units, axes, n).
+
+        Over the few degrees of freedom of its block a deviation has Student's t, whose squares do not add up to F over the axes:
+        its normal equivalent (Wallace, Ann. Math. Stat. 30 (1959) 1124) is given.
+        """
         if np.isfinite(self.prior):
-            squares, dof = self.squares[:, None], self.dof[:, None]
-            variance = np.maximum(squares - drop, 0.0) + self.centre[:, None]
-            variance = variance / np.maximum(dof - 1.0 + self.prior, 1.0)
-        else:
-            every = drop.reshape(self.units, self.axes, self.n).sum(axis=1)
-            total, count = float(self.squares.sum()), float(self.dof.sum())
-            variance = np.repeat((total - every) / max(count - self.axes, 1.0), self.axes, axis=0)
+            rest = np.maximum(self.squares[:, None] - drop, 0.0) + self.centre[:, None]
+            dof = np.maximum(self.dof - 1.0 + self.prior, 1.0)[:, None]
+            narrowed = ((8.0 * dof + 1.0) / (8.0 * dof + 3.0)) ** 2 * dof
+            normal = narrowed * np.log1p(drop / np.maximum(rest, 1e-300))
+            return normal.reshape(self.units, self.axes, self.n)
+        every = drop.reshape(self.units, self.axes, self.n).sum(axis=1)
+        total, count = float(self.squares.sum()), float(self.dof.sum())
+        variance = np.repeat((total - every) / max(count - self.axes, 1.0), self.axes, axis=0)
         return (drop / np.maximum(variance, 1e-300)).reshape(self.units, self.axes, self.n)
 
     def delete(self, unit: int, dwell: int) -> Array:
