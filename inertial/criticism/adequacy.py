@@ -14,7 +14,6 @@ from inertial.estimation.covariance import LARGE
 from inertial.estimation.likelihood import mean_share, scatter_of_poses, shared_noise
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import log_p_value
-from inertial.estimation.space import Space
 
 _BATCH = 33
 _NUMBERS = 4_000_000
