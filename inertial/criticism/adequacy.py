@@ -11,10 +11,9 @@ from inertial.criticism.noise_draws import NoiseDraws
 from inertial.decisions import CERTAIN_BELOW, DRAWS, ENOUGH
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import LARGE
-from inertial.estimation.likelihood import scatter_of_poses, shared_noise
+from inertial.estimation.likelihood import mean_share, scatter_of_poses, shared_noise
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import log_p_value
-from inertial.estimation.space import Space
 
 _BATCH = 33
 _NUMBERS = 4_000_000
@@ -50,9 +49,8 @@ def _worst_look(field: Candidates, drivers: list[Driver], model: Model) -> tuple
             log_p = log_p_value(space, drop, rank)
             together = of_poses if candidate.shared else common
             if log_p < worst and together > 1.0:
-                log_p = log_p_value(
-                    space, drop * _part_not_shared(space, candidate, point, together, model.problem.per_unit), rank
-                )
+                along = 1.0 if candidate.shared else mean_share(space, candidate, point, model.problem.per_unit)
+                log_p = log_p_value(space, drop * (1.0 - along * (1.0 - 1.0 / together)), rank)
             worst = min(worst, log_p)
     return worst, looks
 
@@ -73,19 +71,6 @@ def _against_draws(draws: NoiseDraws, looks: Callable[[], Iterable[Candidate]], 
                 draws.keep(used)
                 break
     return float(np.log((1.0 + beyond) / (1.0 + drawn)))
-
-
-def _part_not_shared(space: Space, candidate: Candidate, point: int, common: float, axes: int) -> float:
-    """Factor on the reduction by a test that accounts for noise common to all units (φ = ``common``)."""
-    if candidate.shared:
-        return 1.0 / common
-    units = space.targets.shape[0] // axes
-    columns = space.project(space.whiten(candidate.of_blocks[:, :, point, :]))
-    inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=1e-4, hermitian=True)
-    fitted = columns @ (inverse @ (np.swapaxes(columns, -1, -2) @ space.residual[..., None]))
-    fitted = fitted[..., 0].reshape(units, axes, -1)
-    total = max(float(np.sum(fitted**2)), 1e-300)
-    return 1.0 - float(units * np.sum(fitted.mean(axis=0) ** 2) / total) * (1.0 - 1.0 / common)
 
 
 def _all_tests(field: Candidates, drivers: list[Driver]) -> Iterator[Candidate]:

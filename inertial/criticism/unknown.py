@@ -23,10 +23,10 @@ from inertial.design import of_axes
 from inertial.effects.covariate import COVARIATE_PREFIX
 from inertial.estimation.alternative import by_block, of_outputs, rotated_force
 from inertial.estimation.candidate import Candidate
-from inertial.estimation.likelihood import shared_noise
+from inertial.estimation.likelihood import restricted_deviance, shared_noise
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise
-from inertial.estimation.penalty import PER_COEFFICIENT, PER_COLUMN, cost_of_model, log_p_value
+from inertial.estimation.penalty import PER_COEFFICIENT, PER_COLUMN, cost_of_model, log_p_value, price
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 from inertial.quantities import is_clock
@@ -167,19 +167,27 @@ def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
     if not fits:
         return None
     best = _tuned(base, min(fits, key=lambda f: f.cost))
-    paid = PER_COEFFICIENT * best.rank + PER_COLUMN * (best.model.local.shape[-1] - base.local.shape[-1])
+    before, after = base.at(best.model.noise), best.model.space
+    # error contrasts: a model without a walk would save its variance along the bias of every block, which has no residual
+    gain = restricted_deviance(base.space, base.space) - restricted_deviance(before, after)
     # noise that the units share follows a curve by chance in all units at once
-    ahead = (cost_of_model(base) - best.cost + paid) / shared_noise(best.model) - paid
-    return best if ahead > decisions.CURVE_AHEAD else None
+    gain *= max(before.dof - best.rank, 0) / max(before.dof, 1) / (shared := shared_noise(best.model))
+    # coefficients along a slow noise cost, at less noise, what that noise costs in the likelihood
+    each = max(PER_COEFFICIENT * best.rank, price(_fall(base, best) / after.variance / shared, best.rank))
+    paid = each + PER_COLUMN * (best.model.local.shape[-1] - base.local.shape[-1])
+    return best if gain - paid > decisions.CURVE_AHEAD else None
 
 
 def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
     """The unexplained dependence that a curve, the best of ``looks`` curves, shows in a model."""
-    before = base.at(fit.model.noise)
-    drop = max(before.rss - fit.model.space.rss, 0.0)
-    log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
+    log_p = log_p_value(base.at(fit.model.noise), _fall(base, fit), fit.rank) + float(np.log(looks))
     driver = fit.driver
     return Unexplained(driver.name, "curve", log_p, driver.part, fit.model.floor(), fit.model, driver.period)
+
+
+def _fall(base: Model, fit: CurveFit) -> float:
+    """Reduction of the sum of squares by a curve, at the noise of the model with it."""
+    return max(base.at(fit.model.noise).rss - fit.model.space.rss, 0.0)
 
 
 def _noises(base: Model) -> list[Noise]:

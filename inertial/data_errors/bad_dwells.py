@@ -10,7 +10,7 @@ from inertial.arrays import Array, Flags, Places
 from inertial.data_errors.bad_norms import bad_norms
 from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import BAD_DWELL, COMMON, MOST_BAD
-from inertial.distributions import chi2_upper, f_tail
+from inertial.distributions import chi2_tail, chi2_upper, f_tail
 from inertial.estimation.alternative import poses
 from inertial.estimation.model import Model
 from inertial.estimation.space import Space
@@ -144,8 +144,9 @@ class _Deletion:
         statistic = np.where(self.left_to_poses, 0.0, statistic)
         unit, dwell = np.unravel_index(int(np.argmax(statistic)), statistic.shape)
         dof = float(self.dof.reshape(self.units, -1).min(axis=1)[unit])
-        freedom = self.axes * (dof - 1.0 + min(self.prior, 1e6)) if np.isfinite(self.prior) else float(self.dof.sum())
-        chance = float(f_tail(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
+        largest, freedom = float(statistic[unit, dwell]), max(float(self.dof.sum()), 1.0)
+        of_equal = f_tail(largest / self.axes, self.axes, freedom)
+        chance = float(chi2_tail(largest, self.axes) if np.isfinite(self.prior) else of_equal) * self.looks
         outlier = int(unit), int(dwell), np.sqrt(squares[unit, :, dwell])
         return outlier if chance < BAD_DWELL and dof >= _LEAST_DOF else None
 
@@ -154,20 +155,20 @@ class _Deletion:
         return self._squares().sum(axis=1)
 
     def _squares(self) -> Array:
-        """Square of the standardised deviation of each dwell by axis, (units, axes, n)."""
-        return self._studentised(np.where(self.known, self.left**2 / self.known_size, 0.0))
+        """Square of the deviation of each dwell by axis, over a variance estimated without the dwell, (units, axes, n).
 
-    def _studentised(self, drop: Array) -> Array:
-        """Squares ``drop`` (blocks, n) over a variance estimated without the dwell, (units, axes, n)."""
+        Over the few degrees of freedom of its block a deviation has Student's t, whose squares do not add up to F over the axes:
+        its normal equivalent (Wallace, Ann. Math. Stat. 30 (1959) 1124) is given.
+        """
+        drop = np.where(self.known, self.left**2 / self.known_size, 0.0)
+        by_axis = drop.reshape(self.units, self.axes, self.n)
         if np.isfinite(self.prior):
-            squares, dof = self.squares[:, None], self.dof[:, None]
-            variance = np.maximum(squares - drop, 0.0) + self.centre[:, None]
-            variance = variance / np.maximum(dof - 1.0 + self.prior, 1.0)
-        else:
-            every = drop.reshape(self.units, self.axes, self.n).sum(axis=1)
-            total, count = float(self.squares.sum()), float(self.dof.sum())
-            variance = np.repeat((total - every) / max(count - self.axes, 1.0), self.axes, axis=0)
-        return (drop / np.maximum(variance, 1e-200)).reshape(self.units, self.axes, self.n)
+            rest = np.maximum(self.squares[:, None] - drop, 0.0) + self.centre[:, None]
+            dof = np.maximum(self.dof - 1.0 + self.prior, 1.0)[:, None]
+            normal = ((8.0 * dof + 1.0) / (8.0 * dof + 3.0)) ** 2 * dof * np.log1p(drop / np.maximum(rest, 1e-200))
+            return normal.reshape(by_axis.shape)
+        rest = float(self.squares.sum()) - by_axis.sum(axis=1, keepdims=True)
+        return by_axis / np.maximum(rest / max(float(self.dof.sum()) - self.axes, 1.0), 1e-200)
 
     def delete(self, unit: int, dwell: int) -> Array:
         """Delete one dwell of a unit and update the statistics; returns its deletion residual, (axes,), g."""

@@ -15,6 +15,7 @@ from inertial.decisions import TOGETHER, UNITS_TOGETHER
 from inertial.design import of_axes
 from inertial.estimation.alternative import Handling, by_block, pose_errors
 from inertial.estimation.bases import unit_columns
+from inertial.estimation.candidate import Candidate
 from inertial.estimation.comparison import estimate, residuals
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, deviance_of
@@ -64,14 +65,14 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
     richer = model.with_term(term)
     noises = [model.noise, richer.noise]
     spaces = [(model.at(noise), richer.at(noise)) for noise in noises]
-    full = [_deviance(space, more) for space, more in spaces]
+    full = [restricted_deviance(space, more) for space, more in spaces]
     best = int(np.argmin(full))
     space, more = spaces[best]
     # includes the coefficients of the unknown state of a memory before the first dwell
     rank = more.local_rank + more.shared_rank - space.local_rank - space.shared_rank
     if rank <= 0 or not space.gain(term.candidate(model.problem)).rank[0]:
         return Ratio(0.0, 0, 0.0, 0.0)
-    plain = _deviance(model.space, model.space)
+    plain = restricted_deviance(model.space, model.space)
     dof = max(space.dof, 1)
     deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
     along, nonlinear = along_mean(model, noises[best], term), freedom(term)
@@ -93,7 +94,7 @@ def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1) -> R
     return Ratio(deviance, rank, paid, float(log_chi2_tail(deviance, coefficients)))
 
 
-def _deviance(contrasts: Space, left: Space) -> float:
+def restricted_deviance(contrasts: Space, left: Space) -> float:
     """−2 log likelihood: error contrasts of the model of ``contrasts``, residual sums of squares of the model of ``left``."""
     return left.logdet + contrasts.information + deviance_of(left.squares, contrasts.by_block)
 
@@ -163,14 +164,17 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
         return 1.0 / units
     if term.shared:
         return 1.0
-    space = model.at(noise)
-    columns = space.project(space.whiten(term.candidate(model.problem).of_blocks[:, :, 0, :]))
-    unit = unit_columns(columns)[0]
-    inverse = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-4, hermitian=True)
-    fitted = (unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ space.residual[..., None])))[..., 0]
-    fitted = fitted.reshape(units, model.problem.per_unit, -1)
+    return mean_share(model.at(noise), term.candidate(model.problem), 0, model.problem.per_unit)
+
+
+def mean_share(space: Space, candidate: Candidate, point: int, axes: int) -> float:
+    """Share, 0 … 1, of the reduction by a candidate's columns at a point of its grid that is common to all units."""
+    columns = unit_columns(space.project(space.whiten(candidate.of_blocks[:, :, point, :])))[0]
+    inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=1e-4, hermitian=True)
+    fitted = columns @ (inverse @ (np.swapaxes(columns, -1, -2) @ space.residual[..., None]))
+    fitted = fitted[..., 0].reshape(-1, axes, fitted.shape[1])
     total = float(np.sum(fitted**2))
-    return float(units * np.sum(fitted.mean(axis=0) ** 2) / total) if total > 0.0 else 0.0
+    return float(len(fitted) * np.sum(fitted.mean(axis=0) ** 2) / total) if total > 0.0 else 0.0
 
 
 def shared_factor(model: Model, term: Term) -> float:

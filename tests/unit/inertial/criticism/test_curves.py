@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from each import each
-from made_worlds import BASE, World, make, run_of
+from made_worlds import BASE, Noise, World, make, run_of
 
 from inertial import effects
 from inertial.criticism.curves import fit_curves
@@ -92,4 +92,16 @@ def test_what_units_share_is_no_random_walk_walks_are_no_course_and_noise_of_sin
     assert curve_in_noise(model, suspects(model.problem)) is None
     model = lot_with(60.0 * np.random.default_rng(SEED + 92).standard_normal(n))
     assert shared_noise(model) > 3.0
+    assert curve_in_noise(model, suspects(model.problem)) is None
+
+
+def test_a_walk_over_the_pauses_between_soaks_is_no_oscillation() -> None:
+    """What a walk puts between soaks lies in the bias of a block, which a model of less walk would not have to explain."""
+    made = make(World(units=12, noise=Noise(white=10.0, flicker=0.0)), SEED + 95)
+    time = made.dwells["time_s"].to_numpy().reshape(12, -1)
+    time = time + 40_000.0 * np.cumsum(np.diff(time, prepend=time[:, :1]) > 600.0, axis=1)
+    steps = np.random.default_rng(0).standard_normal((3, *time.shape)) * np.sqrt(np.diff(time, prepend=time[:, :1]))
+    dwells = made.dwells.assign(time_s=time.ravel()).drop(columns="since_power_s")
+    dwells[["out_x", "out_y", "out_z"]] += 5e-8 * np.cumsum(steps, axis=2).reshape(3, -1).T
+    model = ExaminedRun(lot_of(measured(dwells), square=False), BASE).model()
     assert curve_in_noise(model, suspects(model.problem)) is None

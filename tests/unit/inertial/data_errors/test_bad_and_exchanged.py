@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 import pytest
 from long_suites import mostly_slow
 from made_worlds import BASE, HIDDEN, NULLS, Noise, World, lot_in, make
@@ -11,11 +12,12 @@ from scipy import integrate, stats
 
 from inertial.criticism.examination import ExaminedRun, examined
 from inertial.data_errors import tails
-from inertial.data_errors.bad_dwells import any_of_all
+from inertial.data_errors.bad_dwells import _Deletion, any_of_all
 from inertial.data_errors.handling.bias_jump import BiasJump
 from inertial.data_errors.handling.units_swapped import UnitsSwapped
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
+from inertial.decisions import BAD_DWELL
 from inertial.estimation.alternative import common, pose_errors
 from inertial.estimation.likelihood import scatter_of_poses
 from pipelines.tables.sound_lot import sound_lot
@@ -75,6 +77,22 @@ def test_a_dwell_far_off_in_normal_noise_is_named(dwells, deviations, runs, monk
         values[5] += deviations * way / np.linalg.norm(way)
         hits += 5 in named(values, monkeypatch)
     assert hits >= min(0.95 * runs, runs - 1)
+
+
+def test_deviations_of_units_whose_noise_differs_are_chi_square_with_few_dwells():
+    """Twelve dwells leave eight degrees of freedom: squares of Student's t over three axes reach much further."""
+    rng = np.random.default_rng(9)
+    made = make(World(units=1, soaks=(25.0,), noise=Noise(white=10.0, flicker=0.0)), 6_300_090)
+    of_unit = made.dwells[made.dwells["dwell"] < 12]
+    lot = lot_in(replace(made, dwells=pd.concat([of_unit.assign(unit=f"U{k}") for k in range(200)])))
+    lot.output[...] += 1e-4 * np.exp(rng.normal(0.0, 0.6, (200, 1, 3))) * rng.standard_normal(lot.output.shape)
+    model = ExaminedRun(lot, BASE[:3]).model()
+    assert np.isfinite(model.noise.prior)
+    deviations = _Deletion(model.space, 3).statistic()
+    beyond = [np.count_nonzero(deviations > stats.chi2.isf(p, 3)) for p in (0.1, 1e-3)]
+    assert beyond[0] == pytest.approx(240, abs=30)
+    assert beyond[1] <= 6
+    assert np.max(deviations) < stats.chi2.isf(BAD_DWELL / deviations.size, 3)
 
 
 def test_two_bad_dwells_are_no_tails_of_each_other_and_one_axis_at_six_deviations_is_not_named(monkeypatch):
