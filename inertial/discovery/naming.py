@@ -42,8 +42,8 @@ _REMAINDER = 0.03
 _REMAINDER_OF_SHAPE = 0.25
 """The same where the effect has a time constant or a width, and its column is that of the middle of their range.
 
-Of a creep of 25 s another effect explained 0.13 of its score in 1000 lots (`python -m benchmarks.discovery names --archives 36`). A
-second effect of the same driver below half of the size of the first is named when the first is in the model with its own shape.
+Of a creep of 25 s another effect explained 0.13 of its score in 1000 lots (`python -m benchmarks.discovery names --archives 36`).
+A second effect of the same driver below half of the size of the first is named when the first is in the model in its own shape.
 """
 
 
