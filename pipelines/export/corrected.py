@@ -170,10 +170,9 @@ def corrected(recording: CorrectableRecording, fit: FitOfUnit, tracking: Trackin
         try:
             force = correct(*model, recording.output, fit.coefficients, fit.nonlinear)
         except MissingInput as problem:
-            others = ", ".join(map(shown, recording.state.covariates)) or "none"
             raise DataRejected(
                 f"{recording.name}: no column {problem.quantity}, which {problem.effect} of run {fit.run} needs; give the column "
-                f"that has it this name (further columns: {others})"
+                f"that has it this name (further columns: {', '.join(map(shown, recording.state.covariates)) or 'none'})"
             ) from None
         step = remaining_step(*model, recording.output, fit.coefficients, fit.nonlinear, force)
     unsolved = ~(np.max(np.abs(step), axis=-1) < CONVERGED_G)  # a nan is not converged

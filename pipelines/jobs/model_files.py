@@ -103,8 +103,7 @@ def use_fitted_model(run: Run, effect_files: Iterable[Path] | None) -> None:
     fitted = (
         run.manifest("coefficients")["parameters"].get("effect_files", {}) if "coefficients" in run.tables() else {}
     )
-    now = effect_file_hashes(fitted)
-    if other := [name for name in now if now[name] != fitted[name]]:
+    if other := [name for name, now in effect_file_hashes(fitted).items() if now != fitted[name]]:
         raise WrongUse(
             f"run {run.id}: {other[0]} was fitted with another state of the effect file, which its coefficients belong to; give "
             f"the file of that fit, or fit again with this one: 'tumbleline fit {run.id} --effect-file FILE.py'"

@@ -66,9 +66,9 @@ def _matches(scope: str, name: str) -> bool:
 def model_digest(change: ModelChange) -> str:
     """Hash of the effects and formulas of a model, and of the Python files of its effects, without its name."""
     formulas = [formula.model_dump(mode="json") for formula in change.formulas]
+    content: dict[str, Any] = {"effects": sorted(change.effects or ()), "formulas": formulas}
     own = effect_file_hashes(change.effects or ())
-    files_of_effects = {"effect_files": own} if own else {}
-    return digest({"effects": sorted(change.effects or ()), "formulas": formulas, **files_of_effects})
+    return digest(content | {"effect_files": own} if own else content)
 
 
 def keep_evidence(archive: Archive, change: ModelChange, document: Mapping[str, Any], runs: list[str]) -> str:

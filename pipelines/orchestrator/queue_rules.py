@@ -41,8 +41,8 @@ CONTINUED = "continues from its checkpoint after a crash, attempt {attempt} of {
 
 
 SETTLED = timedelta(seconds=SILENCE_S + 15)
-"""Time after a crash in which the worker of Prefect may still hold the run's slot (it exits if it receives the run again), and in
-which the server may still close the run for the heartbeat that the dead process owes: its successor has sent none yet."""
+"""Time after a crash in which the worker of Prefect may still hold the run's slot, and exits if it receives the run again, and in
+which the server may still close the run for the heartbeat that its dead process owes."""
 
 
 def apply_rules(pool: str, queue: str, now: datetime | None = None) -> list[str]:
