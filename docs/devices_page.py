@@ -6,8 +6,13 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from docs.generated_page import cell, write_or_check
-from pipelines.commissioning.conformance import read_conformance
+from pipelines.commissioning.conformance import FORMAT
+from pipelines.commissioning.documents import ConformanceDocument
+from schemas.errors import DataRejected
+from schemas.foreign import foreign
 from schemas.profile import Command, Profile, Register
 from stations.devices.adapters import adapters
 from stations.devices.equipment import Equipment
@@ -40,6 +45,20 @@ disagree. Addresses are those on the wire, from 0. [Your device in an hour](../h
 profile with your device.
 """
 CONFORMANCE = PAGE.parents[2] / "stations" / "conformance"
+
+
+def read_conformance(path: Path) -> ConformanceDocument:
+    """A conformance document from its file.
+
+    Raises DataRejected: the file is not of the format.
+    """
+    with foreign(f"conformance: {path}", "a file that 'tumbleline station bring-up' wrote is needed"):
+        document = TypeAdapter(ConformanceDocument).validate_json(path.read_bytes())
+    if document["format"] != FORMAT:
+        raise DataRejected(
+            f"conformance: {path} has format '{document['format'][:40]}', '{FORMAT}' is needed; update the product"
+        )
+    return document
 
 
 def page() -> str:

@@ -31,15 +31,11 @@ def _moved_stations(audit: Audit) -> Iterator[AuditFinding]:
     changes = [(c.significance, series, c) for series in audit.stations for c in series.changes]
     for _, series, change in sorted(changes, key=lambda item: -item[0]):
         first = float(series.day[change.first])
-        near = any(station == series.station and abs(day - first) < _reach(series, change) for station, day in reported)
+        days = series.day[min(change.high, series.day.size - 1)] - series.day[max(change.low - 1, 0)]
+        near = any(station == series.station and abs(day - first) < 7.0 + days for station, day in reported)
         reported.append((series.station, first))
         if not near and first >= audit.scope.since:
             yield _moved(audit, series, change, "station_moved")
-
-
-def _reach(series: StationSeries, change: ChangePoint) -> float:
-    """Days within which another change is the same event."""
-    return 7.0 + float(series.day[min(change.high, series.day.size - 1)] - series.day[max(change.low - 1, 0)])
 
 
 def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str) -> AuditFinding:

@@ -65,6 +65,7 @@ def command(
     ] = None,
     setting: Annotated[list[str] | None, options.set_option(SETTINGS)] = None,
     include: options.IncludeOption = None,
+    effect_file: options.EffectFileOption = None,
     archive: options.ArchiveOption = None,
     *,
     as_json: options.JsonOption = False,
@@ -79,7 +80,7 @@ def command(
     from pipelines.export.corrected import corrected, fit_of_unit
     from pipelines.export.correction import correction_document, tracking_of
     from pipelines.export.recording import at_calibrated_supply, read_recording, without_force
-    from pipelines.jobs.model_files import use_formulas_of
+    from pipelines.jobs.model_files import use_fitted_model
     from pipelines.stages.uncertainty.budget_terms import archived_terms
 
     printed = is_standard_output(output, "correct", as_json=as_json)
@@ -91,7 +92,7 @@ def command(
         raise WrongUse(f"correct: --track {' and '.join(track or ())}, one of them is needed; leave the others out")
     store = Archive(archive)
     run = store.run(name)
-    use_formulas_of(run)
+    use_fitted_model(run, effect_file)
     fit = fit_of_unit(run, unit, **options.included(include))
     with error_console().status(f"reading {file.name}"):
         exported = fit.exported

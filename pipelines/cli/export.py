@@ -11,6 +11,7 @@ from pipelines.cli.export_waveforms import write_record
 from pipelines.cli.next_commands import archive_words, command_line
 from pipelines.cli.options import (
     ArchiveOption,
+    EffectFileOption,
     FilterOption,
     IncludeOption,
     JsonOption,
@@ -93,6 +94,7 @@ def command(
         int | None,
         option("--waveforms N", f"Instead, the waveforms of this record of a test, from 0, of one unit: {WAVEFORMS}."),
     ] = None,
+    effect_file: EffectFileOption = None,
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
@@ -110,7 +112,7 @@ def command(
     from pipelines.export import FORMATS, ExportSettings, device_ids, export_files, unit_calibrations
     from pipelines.export.swept_teds import is_sweep, swept_files
     from pipelines.export.teds import data_sheet
-    from pipelines.jobs.model_files import use_formulas_of
+    from pipelines.jobs.model_files import use_fitted_model
 
     if as_json and (waveforms is not None or form not in {"", "json"}):
         other = "--waveforms writes files" if waveforms is not None else f"--format {form} is another form"
@@ -123,7 +125,7 @@ def command(
     if form not in FORMATS:
         raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
     source = Archive(archive).run(run)
-    use_formulas_of(source)
+    use_fitted_model(source, effect_file)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     if form == "teds" and is_sweep(source):
         sheet = data_sheet(given.get("teds", ""), measured_on(source))

@@ -153,15 +153,14 @@ def outputs(given: Sequence[Path] | None, kinds: Mapping[str, Sequence[str]], wh
         ending = "-" if path == STANDARD_OUTPUT else path.suffix.lower()
         kind = next((kind for kind, endings in kinds.items() if ending in endings), None)
         if kind is None or kind in files:
-            named = "; ".join(f"{kind}: {', '.join(map(_ending, endings))}" for kind, endings in kinds.items())
+            named = "; ".join(
+                f"{kind}: {', '.join(end or 'no ending, a folder' for end in endings)}"
+                for kind, endings in kinds.items()
+            )
             why = "the ending says nothing that can be written" if kind is None else f"a second {kind}"
             raise WrongUse(f"{where}: --output {shown(str(path))}: {why}; name one file of each kind ({named})")
         files[kind] = path
     return files
-
-
-def _ending(ending: str) -> str:
-    return ending or "no ending, a folder"
 
 
 ArchiveOption = Annotated[

@@ -198,8 +198,9 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
             say(f"  code     {made['made']['code'][:16]}… with {libraries}")
     lines = [
-        [entry.certificate, entry.event.covers, entry.start, entry.until, _state(entry, day), entry.run, _why(entry)]
+        [entry.certificate, entry.event.covers, entry.start, entry.until, state, entry.run, _why(entry)]
         for entry in history
+        for state in ["expired" if entry.state == "valid" and day >= entry.until else entry.state]
     ]
     print_table(["certificate", "covers", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []
@@ -210,10 +211,6 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
             [r["effect"], r["axis"], r["name"], *rounded(r["value"], r["standard_error"]), r["unit_text"]] for r in rows
         ]
         print_table(["effect", "axis", "name", "value", "standard error", "unit"], cells)
-
-
-def _state(calibration: Calibration, day: str) -> str:
-    return "expired" if calibration.state == "valid" and day >= calibration.until else calibration.state
 
 
 def _why(calibration: Calibration) -> str:

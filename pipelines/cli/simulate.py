@@ -42,6 +42,7 @@ def command(
         str, option("--seed N|none", "Of the noise: the same gives the same samples; none: no noise.")
     ] = "0",
     include: options.IncludeOption = None,
+    effect_file: options.EffectFileOption = None,
     archive: options.ArchiveOption = None,
     *,
     as_json: options.JsonOption = False,
@@ -56,7 +57,7 @@ def command(
     from pipelines.export.recording import read_recording
     from pipelines.export.trajectory import simulated, simulation_document, write_output
     from pipelines.importers.mapping import pairs
-    from pipelines.jobs.model_files import use_formulas_of
+    from pipelines.jobs.model_files import use_fitted_model
 
     time, unknown = options.mapped_outputs(columns)
     if unknown:
@@ -69,7 +70,7 @@ def command(
     begin = None if seed == NO_NOISE else int(seed)
     name, _, unit = calibration.partition(":")
     run = Archive(archive).run(name)
-    use_formulas_of(run)
+    use_fitted_model(run, effect_file)
     fit = fit_of_unit(run, unit, **options.included(include))
     with error_console().status(f"reading {file.name}"):
         recording = read_recording(file, FORCE_COLUMNS, time=time, rate_hz=rate)

@@ -2,14 +2,10 @@
 
 from pathlib import Path
 
-from pydantic import TypeAdapter
-
 from pipelines.commissioning.documents import ConformanceDocument, Platform
 from pipelines.commissioning.frames import timeline
 from pipelines.drawing import still, svg_text
 from pipelines.report.templates import template
-from schemas.errors import DataRejected
-from schemas.foreign import foreign
 from stations.bringup.session import BringUp
 from stations.recordings.frame_file import read_frames
 
@@ -46,20 +42,6 @@ def document_of(
         "recording": recording,
         "corrected_profile": corrected,
     }
-
-
-def read_conformance(path: Path) -> ConformanceDocument:
-    """A conformance document from its file.
-
-    Raises DataRejected: the file is not of the format.
-    """
-    with foreign(f"conformance: {path}", "a file that 'tumbleline station bring-up' wrote is needed"):
-        document = TypeAdapter(ConformanceDocument).validate_json(path.read_bytes())
-    if document["format"] != FORMAT:
-        raise DataRejected(
-            f"conformance: {path} has format '{document['format'][:40]}', '{FORMAT}' is needed; update the product"
-        )
-    return document
 
 
 SECTIONS = {"Reach": "reach", "Against the panel": "panel", "Orders": "order", "Registers": "register"}

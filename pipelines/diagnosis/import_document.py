@@ -49,12 +49,13 @@ def import_document(
             paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
         )
         exchange, unread = "columns" not in keys and is_exchange(content.table.columns), ()
-        if exchange and stated is not None:
+        more = stated is not None or fit or keys.keys() - {"units", "device"}
+        if exchange and more:
             keys, unread = mapped.of_exchange(content.table, keys)
             if beside := file_beside(str(paths[0]), "history"):
-                unread += (f"temperatures that are not read with --references: {Path(beside).name}",)
+                unread += (f"temperatures that are not read with --references, --fit or --set: {Path(beside).name}",)
         elif exchange:
-            return _table_of_dwells(content.table, keys, paths[0], source, fit, archive)
+            return _table_of_dwells(content.table, keys, paths[0], source, archive)
         how = _mapping(keys, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
     judged = None
@@ -88,19 +89,13 @@ def import_document(
 
 
 def _table_of_dwells(
-    table: pd.DataFrame, keys: dict[str, Any], path: Path, source: SourceFile, fit: str, archive: str | None
+    table: pd.DataFrame, keys: dict[str, Any], path: Path, source: SourceFile, archive: str | None
 ) -> dict[str, Any]:
     """Import a table of dwells in the exchange format, whose column names replace a mapping; returns the document."""
     from pipelines.diagnosis.inputs import file_beside
     from pipelines.importers.exchange import checked, read_history
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
-    if fit or set(keys) - {"units", "device"}:
-        more = [*sorted(set(keys) - {"units", "device"}), *(["fit"] if fit else [])]
-        raise WrongUse(
-            f"import: {path.name} is a table of dwells in the exchange format, which takes --unit-of output=… and --device alone "
-            f"(found {', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
-        )
     beside, device = file_beside(str(path), "history"), str(keys.get("device", ""))
     dwells, remarks = complete_table(
         checked(table, where=path.name, foreign=True), keys.get("units", {}).get("output", "")

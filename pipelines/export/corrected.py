@@ -12,6 +12,7 @@ from inertial import static_intervals
 from inertial.arrays import Array, Flags
 from inertial.correction import correct, output_covariance, remaining_step
 from inertial.design import carried_over
+from inertial.errors import MissingInput
 from inertial.noise.bias_filter import BiasState, Track, track
 from inertial.noise.gauss_markov import FlickerTerms, bias_model, flicker_of_steps
 from inertial.noise.terms import LikelyTerms, likely_terms
@@ -22,6 +23,7 @@ from pipelines.export.unit_noise import UnitCurve, curve_of_unit, required_noise
 from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.foreign import shown
 from schemas.units import AXES, MICRO
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
@@ -165,7 +167,13 @@ def corrected(recording: CorrectableRecording, fit: FitOfUnit, tracking: Trackin
     """
     model = (fit.effects, recording.state)
     with np.errstate(over="ignore", invalid="ignore"):  # a sample without a solution is refused below
-        force = correct(*model, recording.output, fit.coefficients, fit.nonlinear)
+        try:
+            force = correct(*model, recording.output, fit.coefficients, fit.nonlinear)
+        except MissingInput as problem:
+            raise DataRejected(
+                f"{recording.name}: no column {problem.quantity}, which {problem.effect} of run {fit.run} needs; give the column "
+                f"that has it this name (further columns: {', '.join(map(shown, recording.state.covariates)) or 'none'})"
+            ) from None
         step = remaining_step(*model, recording.output, fit.coefficients, fit.nonlinear, force)
     unsolved = ~(np.max(np.abs(step), axis=-1) < CONVERGED_G)  # a nan is not converged
     if unsolved.any():

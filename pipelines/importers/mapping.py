@@ -193,6 +193,11 @@ class Mapping(BaseModel):
             raise ValueError(
                 f"{alone[0]} without {alone[0][-1]}; a standard deviation belongs to an output: map it too"
             )
+        search = [
+            name for name in ("block_s", "window_s", "threshold", "shortest_s") if getattr(self, name) is not None
+        ]
+        if search and self.rows == "dwells":
+            raise ValueError(f"{search[0]} finds dwells in samples, each row is a dwell already; leave it out")
         if len(self.signs) not in {len(self.axes), len(NEEDED)}:
             raise ValueError(f"{len(self.signs)} signs for {len(self.axes)} axes; one for each axis is needed")
         if "tilt" in self.columns and len(self.axes) == len(NEEDED):
@@ -267,7 +272,7 @@ def of_exchange(table: pd.DataFrame, keys: dict[str, Any]) -> tuple[dict[str, An
             raise WrongUse(
                 f"import: --unit-of output={units['output']}, the table's out_unit is {shown(stated)}; correct one of the two"
             )
-    told = (f"columns that are not read with --references: {', '.join(unread)}",) if unread else ()
+    told = (f"columns that are not read with --references, --fit or --set: {', '.join(unread)}",) if unread else ()
     return {**keys, "columns": columns, "units": units, "rows": "dwells"}, told
 
 

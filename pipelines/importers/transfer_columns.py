@@ -190,7 +190,7 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
         raise DataRejected(f"{where}: column '{shown(column)}' of {meaning} is not there; {there}")
     ending = column.rpartition("_")[2] if "_" in column else ""
     stated = (
-        content.units.get(column, "")
+        COVERAGE.sub("", content.units.get(column, ""))
         or unit_in(COVERAGE.sub("", column))
         or (ending if _plain(ending) in UNITS[meaning] else "")
     )

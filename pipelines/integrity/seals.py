@@ -140,7 +140,8 @@ def _fault_of_seal(run: Run, content: dict[str, Any], chain: Chain, checked: Ver
     if f"runs/{run.id}/run.json" not in checked.named(content, "files", mark):
         return f"{OF_ANOTHER}: the folder was exchanged with another or renamed; restore it from a copy"
     if chain.entries[number] != content["files"]:
-        return f"differs from what entry {number} of the chain sealed: run and chain are not from one archive"
+        copied = "restore both from one copy, or work in the archive that made the run (--archive)"
+        return f"differs from what entry {number} of the chain sealed: run and chain are not from one archive; {copied}"
     if not set(content) <= {"entry", "files", "stages"} or files.json_bytes(content) != mark.read_bytes():
         return "was changed since it was written; restore it from a copy"
     return "" if _has_its_stages(run, content) else "names other stages than those that made the tables"

@@ -1,6 +1,7 @@
 """Model files: formulas as effects, versions as a history, and the next version with one more effect."""
 
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -87,15 +88,37 @@ def use_formulas_of(run: Run) -> None:
     use_formulas([FormulaSpec.model_validate(spec) for spec in formulas], f"run {run.id}")
 
 
+def effect_file_hashes(names: Iterable[str]) -> dict[str, str]:
+    """Effect → hash of the Python file (``--effect-file``) that it is of; others are left out."""
+    modules = {name: type(effects.get(name)).__module__ for name in names}
+    of_files = {name: module for name, module in modules.items() if module.startswith(effects.OF_A_FILE)}
+    return {name: files.sha256(Path(str(sys.modules[module].__file__))) for name, module in of_files.items()}
+
+
+def use_fitted_model(run: Run, effect_files: Iterable[Path] | None) -> None:
+    """Add the effects that the coefficients of a run are of to the catalogue; refuse a file that is not that of the fit."""
+    for path in effect_files or ():
+        effects.add_file(path)
+    use_formulas_of(run)
+    fitted = (
+        run.manifest("coefficients")["parameters"].get("effect_files", {}) if "coefficients" in run.tables() else {}
+    )
+    if other := [name for name, now in effect_file_hashes(fitted).items() if now != fitted[name]]:
+        raise WrongUse(
+            f"run {run.id}: {other[0]} was fitted with another state of the effect file, which its coefficients belong to; give "
+            f"the file of that fit, or fit again with this one: 'tumbleline fit {run.id} --effect-file FILE.py'"
+        )
+
+
 def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
     """Refuse unknown effects, with similar names."""
     for name in names:
         try:
             effects.get(name)
         except UnknownEffect as problem:
-            own = "" if problem.close else "; one of a Python file needs --effect-file FILE.py, or its package"
             raise RecipeInvalid(
-                f"{where}: unknown effect '{shown(name)}'; {did_you_mean(name, effects.catalogue())}{own}",
+                f"{where}: unknown effect '{shown(name)}'; {did_you_mean(name, effects.catalogue())}; "
+                "one of a Python file needs --effect-file FILE.py, or its package",
                 key="effects",
                 close=problem.close,
             ) from None

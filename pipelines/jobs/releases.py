@@ -17,7 +17,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.jobs.documents import ReleaseRecord
 from pipelines.jobs.model_change import ModelChange
-from pipelines.jobs.model_files import chosen_effects, use_formulas
+from pipelines.jobs.model_files import chosen_effects, effect_file_hashes, use_formulas
 from pipelines.jobs.recipes import load_recipe
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec, Recipe
@@ -64,9 +64,11 @@ def _matches(scope: str, name: str) -> bool:
 
 
 def model_digest(change: ModelChange) -> str:
-    """Hash of the effects and formulas of a model, without its name."""
+    """Hash of the effects and formulas of a model, and of the Python files of its effects, without its name."""
     formulas = [formula.model_dump(mode="json") for formula in change.formulas]
-    return digest({"effects": sorted(change.effects or ()), "formulas": formulas})
+    content: dict[str, Any] = {"effects": sorted(change.effects or ()), "formulas": formulas}
+    own = effect_file_hashes(change.effects or ())
+    return digest(content | {"effect_files": own} if own else content)
 
 
 def keep_evidence(archive: Archive, change: ModelChange, document: Mapping[str, Any], runs: list[str]) -> str:

@@ -22,7 +22,7 @@ from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.client.schemas.sorting import FlowRunSort
 from prefect.states import Cancelled, Scheduled
 
-from pipelines.orchestrator.dead_runs import WORKING, LostRuns, lives, runs_of_queue
+from pipelines.orchestrator.dead_runs import SILENCE_S, WORKING, LostRuns, lives, runs_of_queue
 from pipelines.orchestrator.policy import policy_of_tags
 from pipelines.orchestrator.worker_health import in_thread
 from schemas.log_lines import tell
@@ -40,19 +40,17 @@ SKIPPED = "skipped: at {when} the station was busy with run {other}; policy busy
 CONTINUED = "continues from its checkpoint after a crash, attempt {attempt} of {attempts}; policy crashed=continue"
 
 
-SETTLED = timedelta(seconds=30)
-"""Time after a crash in which the worker of Prefect may still hold the run's slot; it exits if it receives the run again."""
+SETTLED = timedelta(seconds=SILENCE_S + 15)
+"""Time after a crash in which the worker of Prefect may still hold the run's slot, and exits if it receives the run again, and in
+which the server may still close the run for the heartbeat that its dead process owes."""
 
 
-def apply_rules(pool: str, queue: str, now: datetime | None = None, settled: timedelta = SETTLED) -> list[str]:
-    """Apply the policies to the runs of a queue; one sentence for each run that changed.
-
-    settled : age of a crash from which its run may continue; zero where the worker has not started yet
-    """
+def apply_rules(pool: str, queue: str, now: datetime | None = None) -> list[str]:
+    """Apply the policies to the runs of a queue; one sentence for each run that changed."""
     at = now or datetime.now(UTC)
     with get_client(sync_client=True) as client:
         return [
-            *_continue_crashed(client, pool, queue, at, settled),
+            *_continue_crashed(client, pool, queue, at),
             *_cancel_missed(client, pool, queue, at),
             *_skip_where_busy(client, pool, queue, at),
         ]
@@ -146,7 +144,7 @@ def _skip_where_busy(client: SyncPrefectClient, pool: str, queue: str, now: date
     return texts
 
 
-def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: datetime, settled: timedelta) -> list[str]:
+def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
     """Schedule runs again that crashed, with the same id, so that they continue their capture in the archive."""
     texts: list[str] = []
     crashed = runs_of_queue(client, pool, queue, (StateType.CRASHED,), FlowRunSort.EXPECTED_START_TIME_DESC)
@@ -154,7 +152,7 @@ def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: dat
         # a living run still drives the station: the server missed its heartbeats
         if policy_of_tags(run.tags).crashed != "continue" or lives(run):
             continue
-        if run.state is None or not settled <= now - run.state.timestamp <= CONTINUED_WITHIN:
+        if run.state is None or not SETTLED <= now - run.state.timestamp <= CONTINUED_WITHIN:
             continue
         # not run_count: a run whose process could not start has none
         crashes = sum(state.type == StateType.CRASHED for state in client.read_flow_run_states(run.id))

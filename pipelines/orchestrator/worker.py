@@ -21,7 +21,6 @@ import sys
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, nullcontext
-from datetime import timedelta
 from pathlib import Path
 from types import FrameType
 
@@ -57,7 +56,7 @@ def start(
         for queue in (station, *queues):
             for run in close_dead_runs_of_queue(pool, queue, name):
                 tell(f"{queue}: run {run} is closed as crashed: its process has ended")
-            for text in apply_rules(pool, queue, settled=timedelta(0)):
+            for text in apply_rules(pool, queue):
                 tell(f"{queue}: {text}")
         if _marker(station).exists():
             _pause(pool, station, paused=False)

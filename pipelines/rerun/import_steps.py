@@ -1,20 +1,18 @@
 """The stages of the chain for a run of imported dwells, as far as what was imported with them allows."""
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from inertial import effects
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.archive import Run, code_hash, files
+from pipelines.archive import Run, code_hash
 from pipelines.archive.keys import digest
 from pipelines.chain.chain import BY_NAME, Tables
 from pipelines.importers.mapping import OUTPUT_UNITS
 from pipelines.importers.plane import plane_answer
+from pipelines.jobs.model_files import effect_file_hashes
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.judge import judge
@@ -90,14 +88,15 @@ def _call(
     stage: str, inputs: tuple[str, ...], parameters: dict[str, Any], call: Callable[[Run], Tables], code: str = ""
 ) -> StageCall:
     """A call of a stage of the chain; ``code`` names its code where it is not that of the stage."""
-    return StageCall(stage, inputs, BY_NAME[stage].outputs, parameters, code_of(code or stage, parameters), call)
+    return StageCall(stage, inputs, BY_NAME[stage].outputs, *with_effect_files(code or stage, parameters), call)
 
 
-def code_of(result: str, parameters: dict[str, Any]) -> str:
-    """Hash of the code of a stage, and of the Python files (``--effect-file``) of the effects that it is called with."""
-    modules = {type(effects.get(name)).__module__ for name in parameters.get("effects", ())}
-    own = sorted(str(sys.modules[name].__file__) for name in modules if name.startswith(effects.OF_A_FILE))
-    return digest([code_hash(result), *(files.sha256(Path(path)) for path in own)]) if own else code_hash(result)
+def with_effect_files(result: str, parameters: dict[str, Any]) -> tuple[dict[str, Any], str]:
+    """Parameters of a stage, with the hashes of the Python files (``--effect-file``) of its effects, and the hash of its code."""
+    own = effect_file_hashes(parameters.get("effects", ()))
+    if not own:
+        return parameters, code_hash(result)
+    return {**parameters, "effect_files": own}, digest([code_hash(result), *sorted(own.values())])
 
 
 def import_step(data: ImportedData, left_out: Dwells, old: Run) -> StageCall:

@@ -23,7 +23,6 @@ from pipelines.rerun.import_steps import (
     ImportedData,
     StageCall,
     budget_step,
-    code_of,
     fit_step,
     grade_step,
     has_poses,
@@ -32,6 +31,7 @@ from pipelines.rerun.import_steps import (
     judge_step,
     plane_step,
     verify_step,
+    with_effect_files,
     zero_of_import,
 )
 from pipelines.stages.figures import UNITS
@@ -145,9 +145,8 @@ def _captured(run: Run, change: ModelChange) -> Plan:
     for stage in STAGES:
         if stage.name == "soak_noise" and not complete and stage.outputs[0] not in run.tables():
             continue  # a run of an earlier version whose samples are gone
-        parameters, call = stage.parameters(job), partial(stage.call, job)
-        code = code_of(stage.name, parameters)
-        steps.append(StageCall(stage.name, stage.inputs, stage.outputs, parameters, code, call))
+        keyed = with_effect_files(stage.name, stage.parameters(job))
+        steps.append(StageCall(stage.name, stage.inputs, stage.outputs, *keyed, partial(stage.call, job)))
     decisive = {key: value for key, value in job.about.items() if key != "station"}
     return Plan(job.recipe.name, tuple(steps), job.about, {**decisive, "code": {s.name: s.code for s in steps[1:]}})
 

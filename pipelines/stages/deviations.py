@@ -147,14 +147,12 @@ def deviations(
             for k in range(len(records))
         ]
     )
-    factor, unit = _integrated(unit) if statistic.integral else (1.0, unit)
+    factor = M_S2.get(unit, 1.0) if statistic.integral else 1.0
+    unit = (
+        ("m/s" if unit in M_S2 else f"{unit or 'unit'}·s") if statistic.integral else unit
+    )  # of an integral over time
     value = factor * raw
     return Deviations(tau, value, value * relative[:, 0], value * relative[:, 1], unit)
-
-
-def _integrated(unit: str) -> tuple[float, str]:
-    """Factor and unit of an integral over time: m/s where the output is an acceleration."""
-    return (M_S2[unit], "m/s") if unit in M_S2 else (1.0, f"{unit or 'unit'}·s")
 
 
 def _largest(mixture: Array, tau: Array, statistic: Statistic) -> list[int | None]:

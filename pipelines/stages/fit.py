@@ -53,7 +53,8 @@ def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None 
     """:func:`fit` of tables that are shared with other stages."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
-    return joined_parts([_tables(lot, _fitted(lot, effects, family)) for lot in _lots(tables, effects)])
+    done = [(lot, _fitted(lot, effects, family)) for lot in _lots(tables, effects)]
+    return joined_parts([{**_rows(*part), "predictions": _prediction_rows(*part)} for part in done])
 
 
 def _lots(tables: LotTables, effects: Sequence[str]) -> list[LotArrays]:
@@ -65,10 +66,6 @@ def _lots(tables: LotTables, effects: Sequence[str]) -> list[LotArrays]:
     if station or any(effect.parameters(state) for effect in sensor):
         return [tables.with_gaps]
     return [part.fitted_kinds for part in tables.parts]
-
-
-def _tables(lot: LotArrays, fitted: NoisyFit) -> dict[str, pd.DataFrame]:
-    return {**_rows(lot, fitted), "predictions": _prediction_rows(lot, fitted)}
 
 
 class FittedLot(NamedTuple):

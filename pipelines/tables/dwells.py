@@ -291,11 +291,6 @@ def _refuse_few_axes(axes: Sequence[int]) -> None:
         )
 
 
-def _columns(force: Array) -> int:
-    """Bias and response to the directions that the poses show, and their slopes over temperature."""
-    return 2 + 2 * int(np.count_nonzero(np.any(force != 0.0, axis=(0, 1))))
-
-
 _WARM = 5.0
 """Range of temperature, K, from which on its linear terms are worth to be taken out of the force that a sensor answers to."""
 
@@ -316,7 +311,8 @@ def _felt_with_temperature(measurement: Measured, response: Array, scale: Array)
     shown, theta = shown_force(force, axes), np.broadcast_to(state.theta, run.shape[:2])
     rows = np.where(readings.there[..., None], design(shown, theta), 0.0)
     # elsewhere the poses of the soaks do not determine the axes and their gain's run
-    told = np.flatnonzero(np.linalg.matrix_rank(rows) >= _columns(shown))
+    needed = 2 + 2 * int(np.count_nonzero(np.any(shown != 0.0, axis=(0, 1))))  # bias, response, slopes over temperature
+    told = np.flatnonzero(np.linalg.matrix_rank(rows) >= needed)
     coefficients = robust_fits(shown[told], readings.output[told], theta[told])
     for unit, of_unit in zip(told, coefficients, strict=True):
         felt[unit] = force_along_axes(of_every_axis(of_unit[:, 1:4], axes), force[unit])

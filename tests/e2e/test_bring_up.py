@@ -18,7 +18,8 @@ from in_process import given
 from long_suites import mostly_slow
 from modbus_devices import VALUES, libmodbus_server, pymodbus_server, words_of
 
-from pipelines.commissioning.conformance import document_of, read_conformance
+from docs.devices_page import read_conformance
+from pipelines.commissioning.conformance import document_of
 from pipelines.tables.json_values import json_value
 from schemas.errors import LinkLost, OperatorNeeded, StationError
 from stations.bringup.corrected import corrected_text

@@ -204,7 +204,7 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
     )
     words = ("--unit-of", "output=LSB", *STATED, "--fit", "norm", "--device", "adxl355")
     first = document_of("import", "table.csv", *words)  # in the exchange format
-    assert "columns that are not read with --references: pose" in first["remarks"]
+    assert "columns that are not read with --references, --fit or --set: pose" in first["remarks"]
     assert (first["device"], "device: " in str(first["remarks"])) == ("ADXL355", False)
     assert any(remark.startswith("held out for verification: H1: ") for remark in first["remarks"])
     fitted = document_of("fit", first["run"], "--limits", "limits.toml")

@@ -184,14 +184,18 @@ def test_a_crashed_run_whose_process_lives_is_not_started_again(monkeypatch: pyt
     monkeypatch.setattr(queue_rules, "runs_of_queue", lambda *_: [run])
     client = Client()
     try:
-        assert queue_rules._continue_crashed(client, "pool", "line-1", NOW, queue_rules.SETTLED) == []
+        assert queue_rules._continue_crashed(client, "pool", "line-1", NOW) == []
         assert client.scheduled == []
     finally:
         process.kill()
         process.wait()
-    [text] = queue_rules._continue_crashed(client, "pool", "line-1", NOW, queue_rules.SETTLED)
+    [text] = queue_rules._continue_crashed(client, "pool", "line-1", NOW)
     assert text.startswith("run a-run continues from its checkpoint")
     assert client.scheduled == ["run-1"]
+    state.timestamp = NOW - timedelta(
+        seconds=dead_runs.SILENCE_S + 10
+    )  # the server may still miss the dead one's heartbeat
+    assert queue_rules._continue_crashed(client, "pool", "line-1", NOW) == []
 
 
 class Queue:

@@ -43,7 +43,10 @@ def read(name: str, data: bytes, group: str) -> Content:
         plain = _unpacked(data, MOST_BYTES + 1)
     refuse_larger(len(plain), len(data), name)
     suffix = ".rds" if plain.startswith(_SINGLE) else ".rda"
-    classes = {**rdata.conversion.DEFAULT_CLASS_MAP, "POSIXct": _times, "integer64": _long_integers}
+    classes = {**rdata.conversion.DEFAULT_CLASS_MAP, "integer64": _long_integers}
+    classes["POSIXct"] = lambda values, _: pd.to_datetime(
+        np.asarray(values, dtype=float), unit="s"
+    )  # s since 1970, UTC
     with foreign(f"{name}: a file of R that cannot be read", REMEDY):
         parsed = rdata.parser.parse_data(plain, extension=suffix)
         found = rdata.conversion.convert(parsed, classes, default_encoding="utf-8")
@@ -57,11 +60,6 @@ def read(name: str, data: bytes, group: str) -> Content:
         raise DataRejected(f"{name}: no data frame in this file of R, one is needed; {REMEDY}")
     frame = frames[chosen([(key, len(frame)) for key, frame in frames.items()], group, name)]
     return Content(pd.DataFrame({str(column): _plain_column(frame[column]) for column in frame.columns}))
-
-
-def _times(values: Any, attributes: Any) -> Any:
-    """R's POSIXct: seconds since 1970, UTC."""
-    return pd.to_datetime(np.asarray(values, dtype=float), unit="s")
 
 
 def _long_integers(values: Any, attributes: Any) -> Any:

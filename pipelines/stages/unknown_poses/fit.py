@@ -82,9 +82,9 @@ def norms_fitted(
         runs = runs_left_out(effects, lot.state.temperature, lot.state.force, measurement.readings.there)
         model = _with_run(Model(problem, terms_of(catalogue.get_all(effects), problem)), effects, runs)
         values = {t.effect.id: t.keywords for t in model.terms if t.keywords}
-        filled = np.where(
-            measurement.readings.there[..., None], measurement.readings.output, _typical(measurement.readings.output)
-        )
+        output = measurement.readings.output
+        typical = np.nan_to_num(np.nanmedian(output, axis=(0, 1)), nan=1.0)
+        filled = np.where(measurement.readings.there[..., None], output, typical)
         shape = "six" if "misalignment" not in effects else "nine"
         origin = [expansion(measurement.readings, unit, shape=shape) for unit in range(len(measurement.units))]
         start = np.stack([o.bias for o in origin]), np.stack([o.response for o in origin]) / gravity
@@ -181,10 +181,6 @@ def norm_tables(done: FittedNorms, dwells: pd.DataFrame) -> dict[str, pd.DataFra
         "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", integers="dwell other"),
         "wander": _wander_rows(done),
     }
-
-
-def _typical(output: Array) -> Array:
-    return np.nan_to_num(np.nanmedian(output, axis=(0, 1)), nan=1.0)
 
 
 def _residual_rows(done: FittedNorms, dwells: pd.DataFrame) -> pd.DataFrame:

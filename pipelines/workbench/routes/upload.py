@@ -1,9 +1,6 @@
 """A file of the user: interpretation of its columns, correction, import, and coefficients."""
 
 import math
-from collections.abc import Iterable, Mapping
-from functools import partial
-from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
@@ -34,25 +31,18 @@ def upload(request: Request) -> Response:
         except TumblelineError as problem:
             problems.append(str(problem))
     problems = [uploads.in_fields(text) for text in problems]
+    dwells = () if reading is None else reading.dwells
+    sizes = [abs(float(row[f"out_{axis}"])) for row in dwells for axis in AXES]
+    sixth = 2e-5 * max(filter(math.isfinite, sizes), default=0.0)  # digit: values near zero have equally many decimals
     folder = bench.settings.folder / uploads.FOLDER
     files = [path for path in folder.iterdir() if not path.name.startswith(uploads.PART)] if folder.is_dir() else []
     there = sorted(files, key=lambda file: -file.stat().st_mtime)[:12]
     return page(
         request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(file) for file in there],
         meanings=uploads.FIELDS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
-        in_fields=uploads.in_fields, level=partial(_level, 0.0 if reading is None else _largest(reading.dwells)),
+        in_fields=uploads.in_fields, level=lambda value: with_uncertainty(float(value), sixth)[0],
         outputs=list(OUTPUT_UNITS), times=[*TIME_UNITS, "samples"], temperatures=TEMPERATURE_UNITS,
     )  # fmt: skip
-
-
-def _largest(dwells: Iterable[Mapping[str, Any]]) -> float:
-    values = (abs(float(row[f"out_{axis}"])) for row in dwells for axis in AXES)
-    return max(filter(math.isfinite, values), default=0.0)
-
-
-def _level(largest: float, value: float) -> str:
-    """The mean of a dwell to the sixth digit of the largest, so that values near zero have equally many decimals."""
-    return with_uncertainty(float(value), 2e-5 * largest)[0]
 
 
 @router.put("/upload/file")

@@ -171,8 +171,9 @@ def look(path: Path, page: UploadPage) -> UploadReading:
     content, source = files.read_content(path)
     table = content.table
     names = tuple(str(column) for column in table.columns)
+    head = [[str(value)[:40] for value in row] for row in table.head(MOST_ROWS).itertuples(index=False)]
     plain = UploadReading(
-        file=page.file, rows=len(table), columns=names, head=_head(table), offered={}, is_exchange=is_exchange(names)
+        file=page.file, rows=len(table), columns=names, head=head, offered={}, is_exchange=is_exchange(names)
     )
     if not page.columns or not page.output:
         return _recognised(plain, replace(content, table=table.head(MOST_LOOKED)), source)
@@ -251,7 +252,3 @@ def imported(request: Mapped[str, Any]) -> dict[str, Any]:
         "lines": [] if judged is None else list(judged.lines), "remarks": list(data.remarks), "fit": request["fit"],
         "coefficients": [] if judged is None else [dict(row) for row in judged.coefficients or []],
     }  # fmt: skip
-
-
-def _head(table: pd.DataFrame) -> list[list[str]]:
-    return [[str(value)[:40] for value in row] for row in table.head(MOST_ROWS).itertuples(index=False)]

@@ -10,6 +10,7 @@ from in_process import document_of
 from scipy import signal
 
 from pipelines.importers.content import Content
+from pipelines.importers.files import read_content
 from pipelines.importers.transfer import import_transfer
 from pipelines.importers.transfer_columns import PointsLayout, output_of, transfer_points
 from schemas.errors import DataRejected, WrongUse
@@ -92,6 +93,8 @@ def test_an_expanded_uncertainty_is_divided_by_the_factor_that_its_heading_state
     u, v = HEAD.split(",")[3:]
     expanded = standard.assign(**{u: 2.0 * standard[u], v: 2.0 * standard[v]})
     expanded = expanded.rename(columns={u: f"U mag [%]{ending}", v: f"U phase [deg]{ending}"})
-    of = [transfer_points(Content(table), "b.csv", PointsLayout())[0] for table in (standard, expanded)]
+    expanded.to_csv(tmp_path / "k.csv", index=False)
+    contents = Content(standard), read_content(tmp_path / "k.csv")[0]
+    of = [transfer_points(content, "b.csv", PointsLayout())[0] for content in contents]
     assert np.allclose(of[1].magnitude_error, of[0].magnitude_error)
     assert np.allclose(of[1].phase_error, of[0].phase_error)

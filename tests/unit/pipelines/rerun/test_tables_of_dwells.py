@@ -19,11 +19,13 @@ from pipelines.diagnosis.import_document import import_document
 from pipelines.importers.keep import complete_table
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange, change_from_options
+from pipelines.jobs.model_files import use_fitted_model
+from pipelines.jobs.releases import model_digest
 from pipelines.rerun.imported_fit import fit_document
 from pipelines.rerun.rerun import again
 from pipelines.stages.fit import fit
 from pipelines.stages.verify import verify as verified
-from schemas.errors import ArchiveUnusable, DataRejected, WrongUse
+from schemas.errors import ArchiveUnusable, DataRejected, RecipeInvalid, WrongUse
 
 Array = NDArray[np.float64]
 PLAIN = ("bias", "scale", "misalignment")
@@ -208,11 +210,14 @@ def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
         complete_table(dwells, "gal")
 
 
-def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None:
+def test_an_import_of_a_table_of_dwells_takes_no_mapping_and_a_day_as_a_mapped_table(tmp_path: Path) -> None:
     path = tmp_path / "lot.csv"
     table(np.random.default_rng(8), units="ABCD").assign(slot=3).to_csv(path, index=False)
-    with pytest.raises(WrongUse, match=r"takes --unit-of output=… and --device alone \(found local_gravity_m_s2\)"):
-        import_document([path], {"local_gravity_m_s2": 9.8}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    keys = {"units": {"output": "g"}, "measured": "2026-11-20"}
+    with pytest.raises(RecipeInvalid, match="threshold finds dwells in samples, each row is a dwell already"):
+        import_document([path], {**keys, "threshold": 3.0}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    dated = import_document([path], keys, "", "", str(tmp_path / "archive"), None, nullcontext)["run"]
+    assert Archive(str(tmp_path / "archive")).run(dated).about["measured"] == "2026-11-20"
     done = import_document([path], {"units": {"output": "mg"}}, "", "", str(tmp_path / "archive"), None, nullcontext)
     run = Archive(str(tmp_path / "archive")).run(done["run"])
     assert run.table("dwells")["out_x"].max() < 2e-3
@@ -243,14 +248,20 @@ def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(tmp_path: Path
     path, archive = tmp_path / "lot.csv", Archive(str(tmp_path / "archive"))
     table(np.random.default_rng(8)).to_csv(path, index=False)
     imported = import_document([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)["run"]
-    runs: list[str] = []
+    runs, evidence = list[str](), set[str]()
     for power in (2, 3, 3):
         own = tmp_path / f"glue_{len(runs)}.py"
         own.write_text(GLUE.replace("POWER", str(power)), encoding="utf-8")
         with additions_forgotten():
             change = change_from_options(",".join((*PLAIN, "glue")), effect_files=[own], where="fit")
             runs.append(again(archive, imported, change).new)
+            evidence.add(model_digest(change))
+            use_fitted_model(archive.run(runs[-1]), ())
+            if power == 3:
+                with pytest.raises(WrongUse, match="another state of the effect file"):
+                    use_fitted_model(archive.run(runs[0]), ())
     assert runs[0] != runs[1] == runs[2]
+    assert len(evidence) == 2  # what a release needs, too
     squared, cubed = (archive.run(name).table("coefficients").query("effect == 'glue'")["value"] for name in runs[:2])
     assert not np.allclose(squared, cubed)
 
