@@ -175,7 +175,8 @@ def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
     # coefficients along a slow noise cost, at less noise, what that noise costs in the likelihood
     each = max(PER_COEFFICIENT * best.rank, price(_fall(base, best) / after.variance / shared, best.rank))
     paid = each + PER_COLUMN * (best.model.local.shape[-1] - base.local.shape[-1])
-    return best if gain - paid > decisions.CURVE_AHEAD else None
+    # gain and price are twice the log evidence of the curve, whose rarity is half of the lead that takes the place of an effect
+    return best if gain - paid > 0.5 * decisions.CURVE_AHEAD else None
 
 
 def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:

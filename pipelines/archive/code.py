@@ -13,7 +13,7 @@ _MODEL = (
     *("inertial.operators", "inertial.splines", "inertial.power"),
 )
 _ENGINE = (
-    *(*_TABLES, *_MODEL, "inertial.data_errors", "inertial.decisions", "inertial.distributions"),
+    *(*_TABLES, *_MODEL, "inertial.counts", "inertial.data_errors", "inertial.decisions", "inertial.distributions"),
     *("inertial.estimation", "inertial.noise"),
 )
 _NOISE = (
@@ -35,7 +35,7 @@ CODE = {
     "validate": (*_SAMPLES, "inertial.pointing", "pipelines.stages.validate"),
     "reduce": (*_TABLES, "pipelines.stages.reduce"),
     "fit": (
-        *(*_ENGINE, "inertial.counts", "inertial.population", "pipelines.stages.fit", "pipelines.stages.noisy_fit"),
+        *(*_ENGINE, "inertial.population", "pipelines.stages.fit", "pipelines.stages.noisy_fit"),
         "pipelines.stages.uncertainty.bias_measurands",
     ),
     "fit of norms": (
@@ -43,11 +43,11 @@ CODE = {
         *("pipelines.stages.uncertainty.bias_measurands", "pipelines.stages.unknown_poses"),
     ),
     "fit in a plane": (
-        *(*_ENGINE, "inertial.counts", "inertial.probability", "inertial.uncertainty"),
+        *(*_ENGINE, "inertial.probability", "inertial.uncertainty"),
         *("pipelines.importers.judged", "pipelines.importers.plane"),
     ),
     "judge": (
-        *(*_ENGINE, "inertial.counts", "inertial.criticism", "inertial.planning.drivers"),
+        *(*_ENGINE, "inertial.criticism", "inertial.planning.drivers"),
         *("inertial.planning.sequences", "inertial.probability", "inertial.roots", "inertial.timing"),
         "pipelines.stages.judge",
     ),
@@ -63,7 +63,7 @@ CODE = {
     ),
     "budget": _BUDGET,
     "budget of norms": (
-        *(*_BUDGET, "inertial.data_errors", "inertial.decisions", "inertial.estimation"),
+        *(*_BUDGET, "inertial.counts", "inertial.data_errors", "inertial.decisions", "inertial.estimation"),
         *("inertial.norm_fit", "pipelines.stages.unknown_poses", "pipelines.stages.verify"),
     ),
     "procedures": (*_PROCEDURES, "pipelines.stages.procedures"),

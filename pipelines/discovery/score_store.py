@@ -93,7 +93,7 @@ class ScoreStore:
                 derived.warn_of_edits(path)
             if state != derived.SOUND or (read := _content(data)) is None:
                 continue
-            names = {k: (_pairs(a), _pairs(b), int(c)) for k, (a, b, c, *_) in read.about["columns"].items()}
+            names = _names(read.about)
             heads = read.table.select([*TEXTS, "units", "floor"]).to_pylist()
             for head in heads:  # interned, because many of a hundred thousand runs have equal texts
                 head.update({name: sys.intern(head[name]) for name in TEXTS if name not in {"run", "when"}})
@@ -270,6 +270,10 @@ def _content(data: bytes) -> _Content | None:
     table = pq.read_table(pa.BufferReader(data[8 : 8 + length]))
     about = json.loads((table.schema.metadata or {}).get(b"about", b"{}"))
     return _Content(table, about, data[8 + length :]) if about.get("version") == VERSION else None
+
+
+def _names(about: dict[str, Any]) -> dict[str, Any]:
+    return {name: (_pairs(entry[0]), _pairs(entry[1]), int(entry[2])) for name, entry in about["columns"].items()}
 
 
 def _pairs(listed: Sequence[Sequence[Any]]) -> tuple[tuple[str, int], ...]:

@@ -85,7 +85,7 @@ def test_a_lot_in_which_every_unit_is_refused_has_a_result_too(tmp_path: Path) -
     run = small_run(tmp_path, {"A1": "stuck", "A2": "nan", "A3": "dead"})
     assert set(run.table("grades")["outcome"]) == {"refused"}
     assert "0 of 3" in render(run)
-    with pytest.raises(WrongUse, match="no unit of run"):
+    with pytest.raises(WrongUse, match="no unit passed, at least one is needed"):
         unit_calibrations(run, (), failed=True)
 
 

@@ -17,7 +17,7 @@ from pipelines.archive import Archive, Run, code_hash
 from pipelines.archive.buffered_run import BufferedRun
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange, change_from_options
-from pipelines.rerun import steps
+from pipelines.rerun import import_steps, steps
 from pipelines.rerun.partition import Batch, run_again
 from pipelines.rerun.reproduce import LEFT_OUT, SAME, check
 from pipelines.rerun.rerun import RerunOutcome, again
@@ -42,7 +42,7 @@ def computed(outcome: RerunOutcome) -> list[str]:
 
 def other_code(monkeypatch: pytest.MonkeyPatch, *stages: str) -> None:
     """As if the code of these stages had been changed."""
-    monkeypatch.setattr(steps, "code_hash", lambda m: "f" * 64 if m in stages else code_hash(m))
+    monkeypatch.setattr(import_steps, "code_hash", lambda m: "f" * 64 if m in stages else code_hash(m))
 
 
 def files_of(run: Run) -> dict[str, bytes]:
