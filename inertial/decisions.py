@@ -277,6 +277,8 @@ effects), and the same as a share of the curve's gain; an effect beside the curv
 `python benchmarks/characteristics.py --only CURVE_AHEAD --runs 4` (`CURVE_SHARE`), at half, at it, at twice as much: a curve
 preferred to a cubic of size 2, a warm-up of size 1, two effects, and to what imitates a bump of no catalogue in 0, 0, 0 of 4 lots
 each.
+A curve that takes the place of noise needs half of it: its gain and price are twice the log evidence. Random walks over pauses
+reach −91 to −5 in 11 lots, a daily course and courses of 1.5 times the noise beside a walk 39 to 163 in 7.
 """
 
 STEPS_UNEVEN = 5.0

@@ -167,15 +167,14 @@ def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
     if not fits:
         return None
     best = _tuned(base, min(fits, key=lambda f: f.cost))
-    before, after = base.at(best.model.noise), best.model.space
+    before, after, shared = base.at(best.model.noise), best.model.space, shared_noise(best.model)
     # error contrasts: a model without a walk would save its variance along the bias of every block, which has no residual
     gain = restricted_deviance(base.space, base.space) - restricted_deviance(before, after)
     # noise that the units share follows a curve by chance in all units at once
-    gain *= max(before.dof - best.rank, 0) / max(before.dof, 1) / (shared := shared_noise(best.model))
+    gain *= max(before.dof - best.rank, 0) / max(before.dof, 1) / shared
     # coefficients along a slow noise cost, at less noise, what that noise costs in the likelihood
     each = max(PER_COEFFICIENT * best.rank, price(_fall(base, best) / after.variance / shared, best.rank))
     paid = each + PER_COLUMN * (best.model.local.shape[-1] - base.local.shape[-1])
-    # gain and price are twice the log evidence of the curve, whose rarity is half of the lead that takes the place of an effect
     return best if gain - paid > 0.5 * decisions.CURVE_AHEAD else None
 
 

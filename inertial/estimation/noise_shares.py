@@ -108,9 +108,8 @@ def _deviances(squares: Array, dof: Array, priors: tuple[float, ...] = PRIOR_DOF
     squares, prior = np.maximum(squares, _EXACT * pooled), np.array(priors)[:, None]
     weight = dof + prior
     centre = np.full(prior.shape, pooled)
-    for _ in range(
-        60
-    ):  # Newton's steps in the logarithm of the centre: plain repetition creeps where the prior is large
+    # Newton's steps in the logarithm of the centre: plain repetition creeps where the prior is large
+    for _ in range(60):
         both = squares + prior * centre
         each = weight / both
         total = np.add.reduce(each, axis=1, keepdims=True)

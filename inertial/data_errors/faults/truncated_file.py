@@ -51,12 +51,13 @@ def _after_end(readings: Readings, unit: int) -> float:
     if not row.any() or not len(others):
         return float(row.size)
     last = int(np.flatnonzero(row)[-1])
-    common = np.isfinite(others).any(axis=0) & np.isfinite(readings.time[unit])
-    if not common.any():
-        return float(row.size - 1 - last)
-    typical = np.nanmedian(others[:, common], axis=0)
-    away = float(np.median(readings.time[unit, common] - typical))
-    own_day = abs(away) > float(np.nanmax(others) - np.nanmin(others))  # measured before or after the others
+    theirs = np.isfinite(others).any(axis=0)
+    typical = np.nanmedian(others[:, theirs], axis=0)
+    behind = readings.time[unit, theirs] - typical
+    if not np.isfinite(behind).any():
+        return float(row.size - 1 - last)  # no dwell in common
+    away = float(np.nanmedian(behind))
+    own_day = abs(away) > float(np.ptp(typical))  # measured before or after the others
     end = readings.time[unit, last] - (away if own_day else 0.0)
     return min(float(row.size - 1 - last), float(np.median(np.sum(others > end, axis=1))))
 
