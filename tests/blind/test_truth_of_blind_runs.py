@@ -42,6 +42,7 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+@pytest.mark.slow
 @each(["cross_coupling", "thermal_hysteresis", "creep_after_move", "backlash", "clipping", "level_error"])
 def test_effect_has_the_size_that_was_asked_for(effect):
     plain = {"plan": "fibonacci24", "soaks": "nine", "units": 3}

@@ -129,6 +129,7 @@ def test_the_installed_product_is_no_larger_than_is_told() -> None:
     assert sum(map(megabytes, packages)) <= MOST_MB
 
 
+@pytest.mark.slow
 def test_no_package_of_a_run_or_an_extra_has_a_licence_of_which_the_guide_does_not_tell() -> None:
     guide = (ROOT / "docs" / "how-to" / "install.md").read_text(encoding="utf-8")
     text = table()

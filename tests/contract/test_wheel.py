@@ -41,6 +41,7 @@ def own_environment(**more: str) -> dict[str, str]:
     return {**kept, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **more}
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_every_tracked_file_samples_and_lock_and_says_what_was_tested(unpacked: Path) -> None:
     needed = {str(path.relative_to(ROOT)) for path in tracked(*SHIPPED)}
     files = [path for top in SHIPPED for path in (unpacked / top).rglob("*") if path.is_file()]
@@ -59,6 +60,7 @@ def test_the_wheel_holds_every_tracked_file_samples_and_lock_and_says_what_was_t
     assert "\nLicense-Expression: Apache-2.0\n" in text
 
 
+@pytest.mark.slow
 def test_the_source_distribution_holds_what_the_wheel_was_built_from(built: tuple[Path, Path]) -> None:
     with tarfile.open(built[1]) as source:
         held = {name.partition("/")[2] for name in source.getnames()}

@@ -130,6 +130,7 @@ def test_help_loads_nothing_heavy_and_a_command_what_it_needs_on_one_thread(arch
     assert pools == {1}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="BLAS takes no second thread on one processor")
 def test_a_number_of_threads_that_the_user_has_set_is_kept() -> None:
     assert process_of("--version", OMP_NUM_THREADS="2")[1] == {2}

@@ -313,6 +313,7 @@ def test_it_is_said_where_the_force_comes_from_and_what_is_stated_counts(
     assert "--track none and at-rest, one of them is needed" in refused(*command, *both)
 
 
+@pytest.mark.slow
 def test_a_gap_changes_neither_steps_nor_uncertainty_and_samples_after_the_last_step_have_that_of_their_time(
     run: Run, home: Path, rng: np.random.Generator
 ) -> None:
@@ -357,6 +358,7 @@ def test_refusals_say_what_is_missing(
     assert REFUSED[words] in refused("correct", *words.split(), "--archive", run.archive.root)
 
 
+@pytest.mark.slow
 def test_the_guide_to_corrections_prints_what_it_says(run: Run, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TUMBLELINE_ARCHIVE", str(run.archive.root))
     bias, rng = np.array([2e-3, 0.0, -1e-3]), np.random.default_rng(3)

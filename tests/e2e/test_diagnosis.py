@@ -157,6 +157,7 @@ def test_what_no_physics_explains_is_offered_as_a_formula_that_then_explains_it(
     text_of("extend", tmp_path / "other.toml", "covariate:humidity_pct", status=0)
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_suspected_is_added_where_it_is_asked_for(tmp_path: Path) -> None:
     dwells, model = tmp_path / "dwells.csv", tmp_path / "model.toml"
     turned_by_hand("hysteresis", 9101).to_csv(dwells, index=False)

@@ -131,6 +131,7 @@ def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate() -> N
     text_of("verify", status=0)
 
 
+@pytest.mark.slow
 def test_an_import_a_fit_and_a_diagnosis_of_one_file_say_the_same() -> None:
     first = imported(Recording(40, "white 280, B 30"), 5, "--fit", "norm", status=None)
     fitted = document_of("fit", first["run"], "--effects", PLAIN)

@@ -255,6 +255,7 @@ def test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines(laggin
     assert (row["confirmed"], row["warnings"]) == (True, [])
 
 
+@pytest.mark.slow
 @pastable
 def test_without_a_history_the_effect_is_warned_of_and_never_refuted(lagging: Run) -> None:
     written(lagging, {"dwells": "a/run7.parquet", "history": "b/then.parquet", "fresh": "c/again.parquet"})

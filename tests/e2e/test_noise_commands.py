@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from each import each
 from in_process import document_of, refused, text_of
+from long_suites import mostly_slow
 
 from benchmarks.worlds.noise import fractional
 from inertial.noise.allan import overlapping
@@ -157,7 +158,10 @@ def test_dates_are_a_time(record: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("given", "unit"),
-    [(("--rate", "100"), "V"), ((), "V"), (("--unit-of", "output=g"), "g"), (("--map", "time=t,x=T [°C]"), "")],
+    mostly_slow(
+        [(("--rate", "100"), "V"), ((), "V"), (("--unit-of", "output=g"), "g"), (("--map", "time=t,x=T [°C]"), "")],
+        *[((), "V"), (("--map", "time=t,x=T [°C]"), "")],
+    ),
 )
 def test_one_axis_has_the_unit_of_its_heading_and_a_temperature_is_no_output(
     given: tuple[str, ...], unit: str, record: Path, tmp_path: Path
@@ -179,6 +183,7 @@ def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
     assert 0.7e-3 < terms["B"]["value"] < 1.4e-3
 
 
+@pytest.mark.slow
 def test_a_million_samples_of_three_axes_take_no_more_than_three_seconds_of_computing() -> None:
     x = np.random.default_rng(0).standard_normal((3, 1_000_000))
     begin = time.process_time()

@@ -47,18 +47,24 @@ ORTHOGONAL = 'orthogonality_mrad = { max = 5.0, unit = "mrad" }\n'
 
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
-    """The archive, and the run of each recipe: of the triads, without verdict and report, and of their first axis alone."""
+    """The folder of recipes and archive, and the run of the first axis alone."""
     folder = tmp_path_factory.mktemp("axes")
     (folder / "own.limits.toml").write_text(LIMITS, encoding="utf-8")
     for name, text in (("three", RECIPE), ("one", RECIPE.replace('device = "sf1500"\n', ONE))):
         (folder / f"{name}.toml").write_text(text.format(name=name), encoding="utf-8")
+    return folder, {"one": document_of("run", folder / "one.toml", "--direct", "--archive", folder / "archive")["run"]}
+
+
+@pytest.fixture(scope="module")
+def both(measured: tuple[Path, dict[str, str]]) -> tuple[Path, dict[str, str]]:
+    """The same with the run of the triads, without verdict and report."""
+    folder, runs = measured
     store = Archive(folder / "archive")
     triads = Runner(Request(str(folder / "three.toml")).job(store), store)
     for stage in ORDER[:-1]:
         if stage != "judge":  # takes longest, and is of the one axis
             triads.stage(stage)
-    run = document_of("run", folder / "one.toml", "--direct", "--archive", store.root)["run"]
-    return folder, {"three": triads.run.id, "one": run}
+    return folder, {**runs, "three": triads.run.id}
 
 
 def table(measured: tuple[Path, dict[str, str]], name: str, which: str) -> pd.DataFrame:
@@ -66,25 +72,27 @@ def table(measured: tuple[Path, dict[str, str]], name: str, which: str) -> pd.Da
     return Archive(folder / "archive").run(runs[which]).table(name)
 
 
-def test_one_axis_has_the_outputs_and_coefficients_of_that_axis_of_a_triad(measured) -> None:
-    one, three = (table(measured, "dwells", which) for which in ("one", "three"))
+@pytest.mark.slow
+def test_one_axis_has_the_outputs_and_coefficients_of_that_axis_of_a_triad(both) -> None:
+    one, three = (table(both, "dwells", which) for which in ("one", "three"))
     assert [name for name in one if name.startswith(("out_", "sd_")) and name != "out_unit"] == ["out_x", "sd_x"]
     assert np.array_equal(one["out_x"], three["out_x"])
     key = ["unit", "axis", "effect", "name"]
-    own, triad = (table(measured, "coefficients", which).set_index(key) for which in ("one", "three"))
+    own, triad = (table(both, "coefficients", which).set_index(key) for which in ("one", "three"))
     assert set(own.index.get_level_values("axis")) == {"x"}
     assert {"Kxy", "Kxz"} <= set(own.index.get_level_values("name"))
-    both = own.join(triad, suffixes=("", "_triad"))
+    beside = own.join(triad, suffixes=("", "_triad"))
     # the weights differ: a triad's noise is estimated from three axes
-    apart = (both["value"] - both["value_triad"]).abs() / both["standard_error_triad"]
+    apart = (beside["value"] - beside["value_triad"]).abs() / beside["standard_error_triad"]
     assert apart.max() < 1.0
 
 
-def test_the_budget_of_one_axis_is_that_of_the_axis_of_a_triad(measured) -> None:
+@pytest.mark.slow
+def test_the_budget_of_one_axis_is_that_of_the_axis_of_a_triad(both) -> None:
     key = ["unit", "quantity", "axis"]
-    rows = [table(measured, "uncertainties", which).set_index(key) for which in ("one", "three")]
-    both = rows[0].join(rows[1], suffixes=("", "_triad"))
-    stated = both[both["u_b"] > 0.0]
+    rows = [table(both, "uncertainties", which).set_index(key) for which in ("one", "three")]
+    beside = rows[0].join(rows[1], suffixes=("", "_triad"))
+    stated = beside[beside["u_b"] > 0.0]
     assert {"bias", "scale", "misalignment", "output", "bias_error"} <= set(stated.index.get_level_values("quantity"))
     ratio = (stated["u_b"] / stated["u_b_triad"]).groupby("quantity")
     for name in ("bias", "scale", "misalignment"):
@@ -95,6 +103,7 @@ def test_the_budget_of_one_axis_is_that_of_the_axis_of_a_triad(measured) -> None
     assert "orthogonality" not in rows[0].index.get_level_values("quantity")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_samples_noise_verdict_grades_and_report_are_those_of_one_axis(measured) -> None:
     folder, runs = measured
@@ -112,6 +121,7 @@ def test_samples_noise_verdict_grades_and_report_are_those_of_one_axis(measured)
         assert words not in report
 
 
+@pytest.mark.slow
 def test_its_certificate_and_its_memory_hold_one_axis(measured) -> None:
     folder, runs = measured
     archive = ("--archive", folder / "archive")
@@ -184,6 +194,7 @@ def test_a_trajectory_along_its_axis_comes_back_through_simulate_and_correct(mea
     assert "correct: --track needs three axes, and unit SF-02 has x alone" in " ".join(told.split())
 
 
+@pytest.mark.slow
 def test_its_plan_speaks_of_one_axis(measured) -> None:
     folder, _ = measured
     planned = document_of("plan", folder / "one.toml", "--output", folder / "plan.html", "--json")
@@ -255,13 +266,10 @@ def test_what_a_device_with_one_axis_cannot_do_is_said(
 
 def test_its_waveforms_have_one_channel(measured, tmp_path: Path) -> None:
     folder, runs = measured
-    archive = ("--archive", folder / "archive")
-    for name, letters in (("one", "x"), ("three", "xyz")):
-        path = tmp_path / f"{name}.csv"
-        said = "".join(text_of("export", runs[name], "--waveforms", "0", *archive, "--output", path).split())
-        names = [f"SF-01 {letter}" for letter in letters]
-        assert said.endswith(f"{path.name}:{','.join(names)}".replace(" ", ""))
-        assert [column.split(" [")[0] for column in pd.read_csv(path).columns] == ["time", *names]
+    path = tmp_path / "one.csv"
+    words = ("--waveforms", "0", "--archive", folder / "archive", "--output", path)
+    assert "".join(text_of("export", runs["one"], *words).split()).endswith("one.csv:SF-01x")
+    assert [column.split(" [")[0] for column in pd.read_csv(path).columns] == ["time", "SF-01 x"]
 
 
 def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(
@@ -269,7 +277,8 @@ def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(
 ) -> None:
     folder, runs = measured
     shutil.copytree(folder / "archive", tmp_path / "archive")
-    shutil.rmtree(Archive(tmp_path / "archive").run(runs["three"]).path)
+    for run in {info.id for info in Archive(tmp_path / "archive").runs()} - {runs["one"]}:
+        shutil.rmtree(Archive(tmp_path / "archive").run(run).path)
     archive = ("--archive", tmp_path / "archive")
     text = " ".join(text_of("discover", *archive, "--html", tmp_path / "page.html").split())
     reason = "no lot can be used: its devices have fewer than three axes (1 run)"
@@ -281,6 +290,7 @@ def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(
     assert not [one for one in recwarn if "divide" in str(one.message)]
 
 
+@pytest.mark.slow
 def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: Path) -> None:
     folder, runs = measured
     archive = ("--archive", folder / "archive")
@@ -294,9 +304,9 @@ def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: 
 
 @pytest.mark.parametrize(("which", "letters"), mostly_slow([("three", "xyz"), ("one", "x")], ("one", "x")))
 def test_teds_of_every_axis_are_in_the_memory_of_the_device_and_stay_there(
-    measured: tuple[Path, dict[str, str]], tmp_path: Path, which: str, letters: str
+    request: pytest.FixtureRequest, tmp_path: Path, which: str, letters: str
 ) -> None:
-    folder, runs = measured
+    folder, runs = request.getfixturevalue("both" if which == "three" else "measured")
     shutil.copytree(folder / "archive", tmp_path / "archive")
     sheet = "teds=manufacturer=17,model=4507,version=B5,mass_g=4.6,initials=QA,period_days=365"
     words = ("--format", "teds", "--set", sheet, "--archive", tmp_path / "archive")

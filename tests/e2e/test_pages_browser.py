@@ -97,7 +97,7 @@ def one_soak(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", mostly_slow(["report", "plan", "audit", "diagnosis"], "report", "plan"))
+@pytest.mark.parametrize("name", mostly_slow(["report", "plan", "audit", "diagnosis"], "report"))
 def test_nothing_is_clipped_and_all_text_can_be_read_light_and_dark(
     browser: Any, pages: dict[str, Path], name: str
 ) -> None:
@@ -230,6 +230,7 @@ def test_figures_are_drawn_on_a_screen_and_pictures_are_printed(browser: Any, re
     assert one.errors == []
 
 
+@pytest.mark.slow
 def test_without_scripts_the_pictures_stay(browser: Any, report: Path) -> None:
     one = Opened(browser, report, java_script_enabled=False)
     first = one.page.locator(".figure > svg").first
@@ -240,6 +241,7 @@ def test_without_scripts_the_pictures_stay(browser: Any, report: Path) -> None:
     assert one.page.locator(".figure > .live").first.is_hidden()
 
 
+@pytest.mark.slow
 def test_a_script_that_is_slipped_in_does_not_run(browser: Any, report: Path, tmp_path: Path) -> None:
     changed = tmp_path / "changed.html"
     text = report.read_text(encoding="utf-8")

@@ -52,6 +52,7 @@ def biases(sink):
     return samples.groupby("record")[["x", "y", "z"]].mean().to_numpy() / LSB_PER_G
 
 
+@pytest.mark.slow
 def test_the_time_with_power_begins_again_and_the_readings_say_for_how_long_there_was_none():
     sink, events = run()
     readings = sink.all(1).drop_duplicates("record").set_index("record")

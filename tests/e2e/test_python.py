@@ -77,6 +77,7 @@ def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataF
     assert sizes[0] > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_next_measurement")
 def test_the_answers_are_those_of_the_commands(lot: tl.Example, tmp_path: Path) -> None:
     lot.run.dwells.to_parquet(tmp_path / "dwells.parquet")
@@ -91,6 +92,7 @@ def test_the_answers_are_those_of_the_commands(lot: tl.Example, tmp_path: Path) 
     assert better.ladder["confirmed"].iloc[-1] is True or bool(better.ladder["confirmed"].iloc[-1])
 
 
+@pytest.mark.slow
 def test_files_of_one_record_are_read_one_after_another(turned: pd.DataFrame, tmp_path: Path) -> None:
     """A logger that begins a file each minute, with a clock that begins anew; no dwell goes from one file into the next."""
     samples = turned.drop(columns="turn")

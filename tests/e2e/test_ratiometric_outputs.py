@@ -152,6 +152,7 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     return SimpleNamespace(run=runner.run, truths=truths, preset=plant.preset)
 
 
+@pytest.mark.slow
 def test_a_lot_fails_by_its_own_errors_alone_and_its_true_bias_and_scale_lie_within_their_uncertainty(
     lot: SimpleNamespace,
 ):
@@ -178,6 +179,7 @@ def test_a_lot_fails_by_its_own_errors_alone_and_its_true_bias_and_scale_lie_wit
     assert np.max(size) < 1000.0  # without the measurement the spread of the supplies is 5000 µg of bias
 
 
+@pytest.mark.slow
 def test_a_recording_at_another_supply_is_corrected_to_the_same_force(lot: SimpleNamespace, tmp_path: Path):
     dwells = lot.run.table("dwells")
     own = dwells[(dwells["unit"] == "C0") & (dwells["kind"] == "dwell")].sort_values("time_s")

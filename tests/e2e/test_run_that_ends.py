@@ -82,6 +82,7 @@ def test_an_order_does_not_replace_the_recipe_that_it_is_made_from(
     assert "limits and visible effects left out" in said
 
 
+@pytest.mark.slow
 def test_the_recipe_of_an_order_is_usable(tmp_path: Path) -> None:
     path = Path(recipe_file(tmp_path, ("[0.0, 50.0]", "[0.0, 25.0, 50.0, 25.0]"), ('units = ["A1", "A2", "A3"]\n', "")))
     path.write_text(f"{path.read_text(encoding='utf-8')}\n[stop]\n", encoding="utf-8")

@@ -160,6 +160,7 @@ def test_small_steps_waits_readings_on_the_way_and_pauses_without_power_take_the
     planned_as_taken(recipe, station_of(), *told_and_true(recipe, station_of())[1:])
 
 
+@pytest.mark.slow
 def test_devices_read_on_the_way_are_planned_at_the_temperatures_they_have_there():
     recipe, config = ordered_recipe(), station_of(slot_gradient_K=0.0, slot_lag_s=(200.0, 200.0))
     sink = captured(recipe, lot_of(1), config)

@@ -117,6 +117,7 @@ def test_noise_and_the_check_standard_are_held_against_the_limits_of_the_file(tm
     ]
 
 
+@pytest.mark.slow
 def test_without_limits_the_check_standard_makes_its_own_from_its_history(tmp_path, state):
     own = {"standard": "SIM0000", "history_min": 5}
     path, kept = changed(tmp_path, self_test=own), state / "checks" / "simulated.jsonl"

@@ -75,6 +75,7 @@ def test_every_kind_is_described_and_in_the_matrix_and_the_page_is_of_these_case
     assert text == page(rows), "write the page again: python tests/fault_matrix.py"
 
 
+@pytest.mark.slow
 def test_a_sound_station_is_true_to_the_last_dwell() -> None:
     result = run_case(Case("vibration:rms_g=0", RECOVERED))
     assert (result.outcome, result.bad, result.spoilt) == (RECOVERED, [], [])

@@ -167,6 +167,7 @@ def test_a_killed_reader_leaves_no_copy_of_a_recording(tmp_path: Path, monkeypat
     assert list((tmp_path / "copies").iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", mostly_slow([signal.SIGKILL, signal.SIGTERM], signal.SIGKILL))
 def test_a_killed_command_leaves_neither_its_reader_nor_a_copy(tmp_path: Path, how: int) -> None:
     (tmp_path / "copies").mkdir()

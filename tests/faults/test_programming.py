@@ -91,6 +91,7 @@ def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
     assert verify(Archive(run.archive.root), [], keys={}).checked.findings == []
 
 
+@pytest.mark.slow
 def test_the_older_copy_is_written_and_the_other_is_kept(run: Run) -> None:
     assert [unit.unit for _, unit in chosen_units(run, ["A1", "A1"])] == ["A1"]  # named twice, written once
     programmed(run, ("A1",))
@@ -112,7 +113,7 @@ DIFFERS = "differs from what was written"
     ("kind", "figures", "step", "reason"),
     [
         ("memory_bad_block", {"copy": 1, "word": 40}, "read back", f"{DIFFERS} from byte 80"),
-        ("memory_worn", {}, "archive the memory", "worn out"),
+        pytest.param("memory_worn", {}, "archive the memory", "worn out", marks=pytest.mark.slow),
         ("memory_power_lost", {"after_s": 0.45}, "read back", DIFFERS),
         pytest.param("memory_power_lost", {"after_s": 0.1}, "read back", DIFFERS, marks=pytest.mark.slow),
     ],
@@ -297,6 +298,7 @@ def test_the_command_asks_before_it_writes_and_what_was_revoked_is_not_written(r
         raise CliRunner().invoke(app, [*words[:-1], "B9", "--yes"]).exception or AssertionError
 
 
+@pytest.mark.slow
 def test_the_guide_prints_what_the_command_prints(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     guide = (ROOT / "docs" / "how-to" / "program-the-device.md").read_text(encoding="utf-8")
     command, _, printed = re.findall(r"```console\n\$ (.*?)```", guide, flags=re.DOTALL)[0].partition("\n")
@@ -365,6 +367,7 @@ def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change
     programmed(run, ("A2",))  # the other units are not concerned
 
 
+@pytest.mark.slow
 def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_device_does_not_have(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

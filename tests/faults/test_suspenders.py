@@ -45,7 +45,7 @@ DISTURBANCES = {
 }
 
 
-@pytest.mark.parametrize("condition", DISTURBANCES)
+@pytest.mark.parametrize("condition", mostly_slow(DISTURBANCES, "vibration"))
 def test_a_condition_that_passes_costs_time_and_no_data(condition, undisturbed):
     sink, events = run(DISTURBANCES[condition])
     assert kinds(events) == ["spoilt", "resumed"]
@@ -61,6 +61,7 @@ def test_a_condition_that_passes_costs_time_and_no_data(condition, undisturbed):
     assert far < 20.0  # LSB of 1/256000 g: the table does not come to rest twice in the same place
 
 
+@pytest.mark.slow
 def test_a_chamber_that_loses_its_power_for_a_while_is_settled_anew():
     recipe = short_recipe(poses=3, temperatures=(60.0,))
     whole, _ = run(recipe=recipe)
@@ -128,6 +129,7 @@ def test_soaks_tell_how_far_they_went_beyond():
     assert 0.0 <= soaks[1]["device_overshoot_K"] < soaks[1]["air_overshoot_K"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("records", mostly_slow([1, 2], 1))
 def test_a_run_killed_around_a_pause_goes_on_bit_for_bit(records):
     fault = DISTURBANCES["door"]

@@ -162,6 +162,7 @@ def test_a_chain_that_was_written_anew_lacks_the_entry_noted_elsewhere(copy: Pat
     assert [f.kind for f in verified(copy, head=head).checked.findings] == ["missing"]
 
 
+@pytest.mark.slow
 def test_a_signed_archive_has_the_same_tables_and_says_by_which_key(
     signed: Path, whole: Path, signed_copy: Path, tmp_path: Path
 ) -> None:
@@ -333,6 +334,7 @@ def test_files_of_the_desktop_disturb_nothing_and_are_told(copy: Path) -> None:
     assert len(Archive(copy).runs()) == 1
 
 
+@pytest.mark.slow
 def test_who_did_not_sign_is_named(signed_copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     make_key(tmp_path / "other.key")
     for path, place in (

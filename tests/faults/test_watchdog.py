@@ -87,6 +87,7 @@ def test_a_holder_that_stood_still_is_refused_when_it_wakes():
     mine.release()
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_in_peace_leaves_its_station_safe_too():
     with served() as port:
         config = modbus_station(port, limits=SLOW)

@@ -56,6 +56,7 @@ def torn_notes(state, pids):
         path.write_text('{"token": "12')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "trouble",
     [full_disk, *(pytest.param(one, marks=pytest.mark.slow) for one in (folder_gone, folder_in_the_way, torn_notes))],
@@ -104,6 +105,7 @@ def ends_without_watchdog(config, monkeypatch):
             time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_a_worker_stopped_with_its_whole_group_leaves_the_station_to_the_watchdog():
     with served() as port:
         config = modbus_station(port, limits=SLOW)

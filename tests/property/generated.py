@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from schemas.tables import TABLES, Column, Table
 
 FEW = settings(
-    max_examples=8,
+    max_examples=5,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture],

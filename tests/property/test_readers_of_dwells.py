@@ -175,6 +175,7 @@ def test_every_reader_hands_on_the_same_state(lot):
         assert_same(state, states["fit"])
 
 
+@pytest.mark.slow
 @slowly
 @given(lots(gaps=True))
 def test_where_units_lack_dwells_a_lot_is_fitted_in_parts_and_the_others_read_alike(lot):

@@ -156,7 +156,7 @@ def read_again(recipe: Recipe) -> Recipe:
     return resolved(parse_as(RecipeFile, recipe_text(recipe, ["a remark"]), "again"), "again")
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(recipe_files())
 def test_a_recipe_written_as_a_file_reads_as_itself_whichever_key_it_has(file):
     assert file.model_fields_set >= set(RecipeFile.model_fields) - MADE_OTHERWISE

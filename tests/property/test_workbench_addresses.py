@@ -12,7 +12,9 @@ from pipelines.workbench.state import MissingPage, PageState, UnitsPage
 
 PAGES = sorted(PageState.__subclasses__(), key=lambda kind: kind.__name__)
 
-CALM = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # the first texts load a table
+CALM = settings(
+    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)  # the first texts load a table
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
 VALUES = {
     "texts": st.lists(TEXT.filter(bool), max_size=4).map(tuple),

@@ -209,6 +209,7 @@ def test_units_that_come_back_to_their_station_are_no_evidence_against_it(rng):
     assert np.mean(held) == pytest.approx(0.95, abs=0.05)
 
 
+@pytest.mark.slow
 def test_lots_that_differ_are_no_evidence_against_their_stations(rng):
     """Units of a lot counted one by one: seven archives in ten had stations that differed, and Ppk held in 76 %."""
     wrong, held, lots, size = 0, [], 30, 8

@@ -91,6 +91,7 @@ def again(plan, count):
     return [SequenceStep(float(o), float(i), 25.0) for o, i in angles[np.arange(count) % len(angles)]]
 
 
+@pytest.mark.slow
 def test_the_proposal_brings_five_times_the_information_of_repeating_the_plan():
     model, group = ambiguous(measured())
     proposed = proposal(model, group, Circumstances(budget=8.0, pace=StationPace(dwell_s=10.0)))
@@ -118,6 +119,7 @@ def test_the_proposal_goes_where_the_two_curves_part():
         assert np.any(np.abs(force[:, axis] - 0.27) < 0.08)
 
 
+@pytest.mark.slow
 def test_the_separation_expected_is_the_separation_found():
     """Of 300 units, measured again as proposed, the wrong rival leaves the chi-square that was expected: by numpy alone."""
     model, group = ambiguous(measured(units=300))

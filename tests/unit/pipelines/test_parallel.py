@@ -79,6 +79,7 @@ def faults(before: str = "") -> int:
     return int(done.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "gnu_get_libc_version"), reason="no GNU C library")
 def test_a_worker_keeps_the_memory_of_its_arrays() -> None:
     plain = faults()

@@ -60,7 +60,7 @@ def test_tables_agree_with_an_integral_of_the_convolution(share, z):
     assert probability == pytest.approx(expected, rel=0.002 if z < 8.0 else 0.15)
 
 
-@pytest.mark.parametrize(("share", "dwells"), [(0.35, 72), (0.6, 72), (1.0, 144), (0.6, 576)])
+@pytest.mark.parametrize(("share", "dwells"), mostly_slow([(0.35, 72), (0.6, 72), (1.0, 144), (0.6, 576)], (0.6, 72)))
 def test_heavy_tails_are_named_in_few_runs(share, dwells, monkeypatch):
     rng = np.random.default_rng([7, dwells, int(100 * share)])
     runs = 80 if dwells < 500 else 30
@@ -68,7 +68,9 @@ def test_heavy_tails_are_named_in_few_runs(share, dwells, monkeypatch):
     assert hits <= 0.07 * runs
 
 
-@pytest.mark.parametrize(("dwells", "deviations", "runs"), [(72, 12.0, 40), (576, 12.0, 20), (576, 7.0, 12)])
+@pytest.mark.parametrize(
+    ("dwells", "deviations", "runs"), mostly_slow([(72, 12.0, 40), (576, 12.0, 20), (576, 7.0, 12)], (72, 12.0, 40))
+)
 def test_a_dwell_far_off_in_normal_noise_is_named(dwells, deviations, runs, monkeypatch):
     """Of many dwells the drawn is known to have no tails: then seven deviations are far."""
     rng, hits = np.random.default_rng([8, dwells]), 0
@@ -122,7 +124,11 @@ def test_scatter_that_follows_the_temperature_is_not_quantised(seed: int) -> Non
 
 
 @pytest.mark.parametrize(
-    "world", [*(NULLS[n] for n in ("B30", "K8", "two_units", "many_units")), HIDDEN["third_order_2"]]
+    "world",
+    mostly_slow(
+        [*(NULLS[n] for n in ("B30", "K8", "two_units", "many_units")), HIDDEN["third_order_2"]],
+        *[NULLS["B30"], HIDDEN["third_order_2"]],
+    ),
 )
 def test_no_pair_is_searched_where_no_units_were_exchanged(world: World) -> None:
     assert UnitsSwapped().locations(lot_in(make(world, 6_300_020))) == []

@@ -21,6 +21,7 @@ def line(correlation: float, share: float, seed: int) -> Correlations:
     return found
 
 
+@pytest.mark.slow
 def test_correlated_errors_of_the_fits_are_no_correlation_of_the_devices() -> None:
     plain = Correlations()
     found = [line(0.0, 0.2, seed) for seed in range(8)]

@@ -136,7 +136,7 @@ FOUND: dict[str, Change] = {
 }
 
 
-@pytest.mark.parametrize("driver", mostly_slow(FOUND, "mean", f"wafer{INSIDE}", "station", "firmware"))
+@pytest.mark.parametrize("driver", mostly_slow(FOUND, f"wafer{INSIDE}", "firmware"))
 def test_what_is_hidden_is_found_by_its_driver(driver: str) -> None:
     made = evidence_of(lots(5, 400, FOUND[driver]))
     assert float(made.drivers[driver].log_e[2]) > NEEDED

@@ -32,7 +32,7 @@ def recorded(kind, damping, noise, rng, seconds=5.0):
     return x[inside], y[inside] + noise * rng.standard_normal(n)
 
 
-@pytest.mark.parametrize("kind", ["random", "sweep"])
+@pytest.mark.parametrize("kind", mostly_slow(["random", "sweep"], "random"))
 @pytest.mark.parametrize("damping", mostly_slow([0.6, 0.05], 0.05))
 def test_intervals_cover_the_response(kind, damping):
     rng, inside, deviations = np.random.default_rng(240_861), [], []
@@ -47,6 +47,7 @@ def test_intervals_cover_the_response(kind, damping):
     assert np.mean(deviations) < 0.02
 
 
+@pytest.mark.slow
 def test_h1_and_coherence_are_those_of_averages_over_segments():
     x, y = recorded("random", 0.6, 0.1, np.random.default_rng(11), seconds=60.0)
     got = frequency_response((x, RATE_HZ), (y, RATE_HZ), per_octave=6)

@@ -23,7 +23,7 @@ def pulse(rng: np.random.Generator) -> tuple[np.ndarray, float, float]:
     return (np.round(felt / 2.0) * 2.0 if kind == 2 else felt), float(rate), float(duration)
 
 
-@pytest.mark.parametrize("together", [1, 2])
+@pytest.mark.parametrize("together", mostly_slow([1, 2], 2))
 @pytest.mark.parametrize("block", mostly_slow(range(3), 0))
 def test_a_sample_that_is_off_is_found_and_nothing_else_is(block: int, together: int) -> None:
     missed, false = [], []

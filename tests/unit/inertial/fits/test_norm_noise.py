@@ -48,6 +48,7 @@ def test_the_error_of_the_bias_of_a_record_is_that_of_a_simulation(rng: np.rando
     np.testing.assert_allclose(error.std(axis=0), stated, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_for_unequal_dwells() -> None:
     """300 recordings on other seeds: 94.7 to 97.9 % (benchmarks/recording_intervals.py); 90 % at the best noise alone."""
     names = ("white 280, B 30", "white 25, B 30", "white 100, axes 1:2:3")

@@ -149,6 +149,7 @@ def test_the_innovations_of_flicker_noise_are_white_and_as_large_as_stated(rng: 
     assert np.mean([one.consistency.stated == "consistent" for one in estimates]) >= 0.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("white", "walk"), mostly_slow([(0.05, 0.0), (1.0, 0.0), (0.05, 0.05)], (0.05, 0.0)))
 def test_a_record_and_its_allan_fit_state_the_error_of_the_bias(white: float, walk: float) -> None:
     """Half an hour at rest gives N, B and K; then updates, and none for up to ten minutes; B = 1."""

@@ -39,6 +39,7 @@ def test_innovations_keep_the_level_and_lose_the_memory() -> None:
     assert innovations(values, 0.0) is values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("memory", "dof"), mostly_slow(KINDS, KINDS[0]), ids=NAMES)
 def test_a_check_standard_in_control_is_found_out_of_it_as_seldom_as_is_said(memory: float, dof: float | None) -> None:
     first, n = 20, 40
@@ -97,7 +98,7 @@ def test_no_value_of_a_small_population_stands_out_by_chance(rng):
     assert np.argwhere(np.abs(robust_z(values)) > outlier_limit(values.size, 40)).tolist() == [[3, 5]]
 
 
-@pytest.mark.parametrize("n", [20, 50, 200])
+@pytest.mark.parametrize("n", mostly_slow([20, 50, 200], 20))
 def test_the_interval_of_ppk_holds_for_folded_values(n: int, rng: np.random.Generator) -> None:
     mean, sigma = np.sqrt(2.0 / np.pi), np.sqrt(1.0 - 2.0 / np.pi)
     limit, held, normal, runs = mean + 4.0 * sigma, 0, 0, 1500
@@ -111,7 +112,8 @@ def test_the_interval_of_ppk_holds_for_folded_values(n: int, rng: np.random.Gene
 
 
 @pytest.mark.parametrize(
-    ("shape", "part", "station", "interaction"), [((10, 3, 3), 3.0, 1.0, 0.5), ((8, 1, 3), 3.0, 0.0, 0.0)]
+    ("shape", "part", "station", "interaction"),
+    mostly_slow([((10, 3, 3), 3.0, 1.0, 0.5), ((8, 1, 3), 3.0, 0.0, 0.0)], ((10, 3, 3), 3.0, 1.0, 0.5)),
 )
 def test_the_intervals_of_a_gauge_study_hold(shape, part, station, interaction, rng):
     p, o, _ = shape

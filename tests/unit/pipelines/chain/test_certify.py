@@ -117,6 +117,7 @@ def test_what_was_revoked_is_certified_again_from_the_same_run_only_by_name_and_
     assert typed("certificate", "issue", run.id).exit_code == 0  # it holds now like the others
 
 
+@pytest.mark.slow
 def test_a_re_run_of_measurements_whose_certificate_was_revoked_is_certified_only_by_name_and_with_a_reason(
     run: Run, typed: Typed
 ) -> None:

@@ -97,6 +97,7 @@ def test_what_the_look_says_is_what_the_run_states(run: Run, tmp_path: Path) -> 
     )
 
 
+@pytest.mark.slow
 def test_a_unit_beyond_its_limit_is_told_once(run: Run, tmp_path: Path) -> None:
     job = job_of(tmp_path, 800.0)
     figures = dict(job.limits.figures)

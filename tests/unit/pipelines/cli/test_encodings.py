@@ -32,6 +32,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_characters_that_an_encoding_lacks_stop_no_command(record: Path) -> None:
     done = command("noise", "allan", str(record), encoding="cp1252")
     assert (done.returncode, done.stderr) == (0, b"")

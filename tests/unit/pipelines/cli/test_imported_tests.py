@@ -201,7 +201,9 @@ def test_uncertainties_that_are_too_large_are_told_and_fail_nothing(tmp_path: Pa
     ("head", "form", "more"),
     [
         ("Frequency (Hz),Magnitude (dB),Phase (rad)", "dB rad", ()),
-        ("frequency_hz,magnitude,phase", "dB rad", ("--unit-of", "magnitude=dB,phase=rad")),
+        pytest.param(
+            "frequency_hz,magnitude,phase", "dB rad", ("--unit-of", "magnitude=dB,phase=rad"), marks=pytest.mark.slow
+        ),
         ("a,b,c", "", ("--map", "frequency=1,magnitude=2,phase=3", "--unit-of", "frequency=Hz,phase=deg")),
     ],
 )

@@ -3,6 +3,7 @@
 import lots
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from benchmarks.hand_turned import make as turned_by_hand
 from inertial import frames
@@ -62,7 +63,7 @@ def test_the_same_data_give_the_same_answer_and_what_a_model_or_a_fresh_run_lack
 
 
 @pytest.mark.usefixtures("no_next_measurement")
-@pytest.mark.parametrize("alike_ug", [0.0, 20.0])
+@pytest.mark.parametrize("alike_ug", mostly_slow([0.0, 20.0], 20.0))
 def test_what_of_the_residual_all_units_have_in_common_is_said_with_its_size(rng, alike_ug: float) -> None:
     table = lots.lot(rng, units=6, noise_ug=10.0, temperatures=(25.0, 25.0))
     wander = rng.normal(0.0, 1e-6 * alike_ug, (table["dwell"].max() + 1, 3))
@@ -97,6 +98,7 @@ def test_effects_of_a_table_are_told_to_be_untried_where_its_angles_are_missing(
     assert "record outer_deg and inner_deg" in told[1]
 
 
+@pytest.mark.slow
 def test_an_effect_that_noise_seldom_explains_is_suspected_with_what_decides_it_where_none_is_named() -> None:
     """Preisach's operator in 39 dwells of one unit: beside a random walk the evidence does not reach that of a name."""
     document = examination(turned_by_hand("hysteresis", 9101), None, None).document

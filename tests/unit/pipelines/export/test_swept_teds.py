@@ -41,6 +41,7 @@ def resonant(f: Any, natural: float = 4000.0, quality: float = 30.0, pole: float
 F = np.geomspace(20.0, 9000.0, 24)
 
 
+@pytest.mark.slow
 def test_sensitivity_is_that_at_the_reference_frequency_with_its_sign_and_the_resonance_is_stated() -> None:
     one, lines = swept_axis("SN7", points(F, resonant(F)), 2)
     at = F[np.argmin(np.abs(np.log(F / 160.0)))]

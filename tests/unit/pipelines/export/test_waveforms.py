@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from in_process import document_of
+from long_suites import mostly_slow
 
 from pipelines.archive import Archive
 from pipelines.cli.export import WAVEFORMS as FORMATS
@@ -44,7 +45,7 @@ def test_two_clocks_are_two_files_where_a_format_has_one(tmp_path: Path, rng: np
         write_waveforms("udf", [reference], tmp_path / "x")
 
 
-@pytest.mark.parametrize("form", ["csv", "tdms", "mat"])
+@pytest.mark.parametrize("form", mostly_slow(["csv", "tdms", "mat"], "tdms"))
 def test_shocks_of_others_give_figures_and_a_verdict(form: str, tmp_path: Path, rng: np.random.Generator) -> None:
     paths = [tmp_path / f"shock{k}{WRITERS[form].suffix}" for k in range(4)]
     for k, path in enumerate(paths):

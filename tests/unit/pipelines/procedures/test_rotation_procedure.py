@@ -48,6 +48,7 @@ def measured() -> Measured:
     return *evaluated(recipe, sink), sink
 
 
+@pytest.mark.slow
 def test_a_lot_gives_what_the_simulated_units_are(measured: Measured) -> None:
     _, outcome, _ = measured
     plant = Plant(load_station(), LOT)

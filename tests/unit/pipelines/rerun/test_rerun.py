@@ -71,6 +71,7 @@ def test_other_limits_only_grade_again(run: Run) -> None:
     assert files_of(run) == before
 
 
+@pytest.mark.slow
 def test_another_model_begins_at_the_fit_and_gives_the_bytes_of_a_first_run_with_it(run: Run, tmp_path: Path) -> None:
     outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
     new = finished(run, outcome)
@@ -106,6 +107,7 @@ def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeyp
 TROUBLE = (KeyboardInterrupt(), DataRejected("verify: no pose"), ValueError("a defect"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trouble", mostly_slow(TROUBLE, TROUBLE[0]))
 def test_a_rerun_that_fails_or_is_stopped_leaves_nothing(
     run: Run, monkeypatch: pytest.MonkeyPatch, trouble: BaseException

@@ -65,6 +65,7 @@ def errors_over_uncertainties(root: Array, seed: int, effect: str, lots: int = 8
     return ((rows["value"] - truth) / rows["standard_error"]).to_numpy()
 
 
+@pytest.mark.slow
 def test_errors_are_as_large_as_the_residuals_say_where_no_samples_tell_the_noise() -> None:
     """Within 2·u as often as k = 2 says; the scale under slow noises, of which a bias is no fixed number."""
     n = len(directions())

@@ -113,6 +113,7 @@ def test_the_error_on_a_fresh_run_is_that_of_the_corrected_norm(archive: Archive
     assert sums["A2"][1] == len(own)
 
 
+@pytest.mark.slow
 def test_a_fit_of_measured_data_is_no_measurement_and_no_fresh_run(archive: Archive, tmp_path: Path) -> None:
     shutil.copytree(archive.root, tmp_path / "archive")
     own = Archive(tmp_path / "archive")

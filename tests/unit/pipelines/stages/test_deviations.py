@@ -41,7 +41,7 @@ def evaluated(name: str, records: np.ndarray, unit: str = "g", rate_hz: float = 
 EVERY = [*product(("modified", "hadamard", "total"), KINDS)]
 
 
-@pytest.mark.parametrize(("name", "kind"), mostly_slow(EVERY, *EVERY[::2]))
+@pytest.mark.parametrize(("name", "kind"), mostly_slow(EVERY, *EVERY[::4]))
 def test_intervals_cover_the_truth_as_often_as_they_say(name: str, kind: str) -> None:
     found = of_noise(name, kind)
     m = np.round(found.tau).astype(np.int64)

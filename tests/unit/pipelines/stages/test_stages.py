@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from capture_double import STANDARD_G, CaptureDouble, plan, small_job
+from long_suites import mostly_slow
 
 from pipelines.archive import Run
 from pipelines.stages.fit import fit
@@ -85,19 +86,22 @@ def captured(folder: Path, fault: str) -> tuple[list[pd.DataFrame], pd.DataFrame
     return samples, readings, validate(summarised(samples, readings), readings, job.lot.units)
 
 
+UNIT_FAULTS = [
+    ("stuck", "stuck_output", "constant output 77 LSB on y in record 0"),
+    ("dead", "dead_channel", "dead channel z: the specific force explains"),
+    ("nan", "not_finite", "nan on x in row 17"),
+    ("infinity", "not_finite", "inf on x in row 17"),
+    ("clipped", "clipped", "1 samples at full scale"),
+    ("overflow", "overflow", "buffer overflow in record 2"),
+    ("short", "dropped_samples", "50 samples of 100 in record 2"),
+    ("stale", "stale_temperature", "moved 0.00 K while the chamber moved 50.0 K"),
+    ("silent", "stopped_answering", "stopped answering at record 3"),
+]
+
+
 @pytest.mark.parametrize(
     ("fault", "name", "words"),
-    [
-        ("stuck", "stuck_output", "constant output 77 LSB on y in record 0"),
-        ("dead", "dead_channel", "dead channel z: the specific force explains"),
-        ("nan", "not_finite", "nan on x in row 17"),
-        ("infinity", "not_finite", "inf on x in row 17"),
-        ("clipped", "clipped", "1 samples at full scale"),
-        ("overflow", "overflow", "buffer overflow in record 2"),
-        ("short", "dropped_samples", "50 samples of 100 in record 2"),
-        ("stale", "stale_temperature", "moved 0.00 K while the chamber moved 50.0 K"),
-        ("silent", "stopped_answering", "stopped answering at record 3"),
-    ],
+    mostly_slow(UNIT_FAULTS, *UNIT_FAULTS[1::3]),
 )
 def test_refuses_the_unit_with_a_fault_and_no_other(tmp_path: Path, fault: str, name: str, words: str) -> None:
     samples, readings, verdicts = captured(tmp_path, fault)

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from small_station import QUIET, lot_of, plant_of, station_of, turn_to, write
 
 from inertial.frames import force_from_angles
@@ -136,6 +137,7 @@ def test_chamber_ramps_within_its_limit_overshoots_a_little_settles_and_shakes_m
 
 
 OF_THE_RESPONSE = {"gas_film", "softening_spring"}  # at rest they change nothing; test_sweep_in_its_air.py has them
+AT_REST = sorted(set(HIDDEN) - OF_THE_RESPONSE)
 
 
 def moved(*hidden):
@@ -149,7 +151,7 @@ def moved(*hidden):
 plain = cache(moved)
 
 
-@pytest.mark.parametrize("kind", sorted(set(HIDDEN) - OF_THE_RESPONSE))
+@pytest.mark.parametrize("kind", mostly_slow(AT_REST, *AT_REST[::4]))
 def test_every_hidden_effect_moves_an_output_and_nothing_at_zero_size(kind):
     size = {
         "cubic_transfer": "hardening", "pendulous_mass": "compliance", "hysteresis_play": "gain", "element_lag": "tempco",

@@ -423,6 +423,7 @@ def test_revoked_amended_and_unknown_certificates_are_told_by_the_archive(issued
     )
 
 
+@pytest.mark.slow
 def test_a_certificate_superseded_by_a_later_run_is_told_and_the_later_one_stays_the_same_when_it_is_revoked(
     issued: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
