@@ -13,6 +13,7 @@ from importlib import metadata
 
 import pytest
 from each import each
+from long_suites import mostly_slow
 from packaging.markers import Marker
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
@@ -102,7 +103,7 @@ def resolve(lock: str, python: str, lines: tuple[str, ...]) -> tuple[list[str], 
     return wrong, {canonicalize_name(parsed(line).name) for _, line, _ in seen}, unknown
 
 
-@pytest.mark.parametrize("python", PATCHES)
+@pytest.mark.parametrize("python", mostly_slow(PATCHES, *PATCHES[::5]))
 @each(sorted(LOCKS))
 def test_a_lock_holds_what_is_needed_on_each_python(lock: str, python: str) -> None:
     wrong, reached, unknown = resolve(lock, python, made_from(lock))

@@ -11,6 +11,7 @@ import pytest
 import recordings
 from each import each
 from in_process import document_of, given, refused, text_of
+from long_suites import mostly_slow
 from recordings import FACES, Recording
 
 from pipelines.importers.exchange import read_dwells
@@ -77,7 +78,10 @@ def frozen_file(one: Recording) -> str:
     return frame.to_csv(index=False)
 
 
-@pytest.mark.parametrize("write", [device_file, epoch_file, stamped_file, gapped_file, frozen_file])
+WRITTEN = (device_file, epoch_file, stamped_file, gapped_file, frozen_file)
+
+
+@pytest.mark.parametrize("write", mostly_slow(WRITTEN, *WRITTEN[2:4]))
 def test_the_command_that_inspect_prints_imports_the_file(write, record: Recording) -> None:
     Path("my sensor.csv").write_text(write(record), encoding="utf-8")
     status, out, _ = given("inspect", "my sensor.csv")

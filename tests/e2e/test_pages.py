@@ -152,6 +152,7 @@ def test_every_procedure_with_figures_has_a_sample_recipe_that_the_built_in_stat
         assert set(load_limits(recipe, (ROOT / printed).parent).figures) <= set(figures_of_recipe(recipe))
 
 
+@pytest.mark.slow
 @each([line for line in PLANS if "optimise" not in line])
 def test_a_plan_of_the_page_on_identifiability_is_made(line: str, home: Path) -> None:
     words = shlex.split(line.replace("deploy/", f"{ROOT}/deploy/"))

@@ -87,6 +87,7 @@ def test_soaks_bring_every_unit_to_its_temperature_and_history_tells_how(whole: 
     assert history["unit_C"].min() < 24.0
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_bit_for_bit_and_another_repeat_has_new_noise_of_the_same_devices(
     whole: MemorySink,
 ) -> None:

@@ -15,8 +15,8 @@ from long_suites import mostly_slow
 
 from pipelines.jobs.recipes import load_recipe
 
-FEW = ("/units", "/run?run=latest", "/unit?run=latest", "/upload", "/station")
-PAGES = (*FEW, "/missing", "/operator", "/models", "/plan", "/audit")
+FEW = ("/unit?run=latest", "/station")
+PAGES = (*FEW, "/units", "/run?run=latest", "/upload", "/missing", "/operator", "/models", "/plan", "/audit")
 """Those that compute for long, which are of the slow suite, are made of the same parts."""
 
 

@@ -122,6 +122,7 @@ def test_a_part_that_somebody_reads_is_not_taken_away(archive: Archive, monkeypa
     assert len(list((archive.root / "index").glob("*/runs.parquet"))) < parts
 
 
+@pytest.mark.slow
 def test_a_kill_in_the_middle_leaves_an_index_that_is_gone_on_with(archive: Archive, made: Path) -> None:
     process = start(KILLED, archive.root)
     process.stdout.readline()

@@ -100,6 +100,7 @@ def test_a_run_killed_there_ends_in_the_same_bytes(tmp_path: Path, undisturbed: 
     assert finish(tmp_path) == undisturbed
 
 
+@pytest.mark.slow
 def test_a_plug_pulled_at_random_times_loses_no_finished_dwell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job = small_job(tmp_path, *BRIEF)
     whole = Runner(job, Archive(tmp_path / "whole"))

@@ -40,6 +40,7 @@ print(rounds)
 """
 
 
+@pytest.mark.slow
 def test_a_reader_finds_every_file_while_packs_are_merged(archive: Archive) -> None:
     compact(archive)
     run = archive.run("latest").id

@@ -13,6 +13,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from long_suites import mostly_slow
 from root_process import ROOT
 from scipy.io import savemat
 
@@ -33,7 +34,7 @@ def test_broken_notes_of_pandas_and_an_index_without_a_name_in_a_parquet_file_do
     assert covariates(exchange.read_dwells(tmp_path / "d.parquet")) == []
 
 
-@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("packed", mostly_slow([False, True], True))
 def test_a_corrupted_matlab_file_is_refused(tmp_path: Path, *, packed: bool) -> None:
     sink = io.BytesIO()
     savemat(sink, {"t": np.arange(1000.0), "s": {"a": np.arange(5.0)}}, do_compression=packed)

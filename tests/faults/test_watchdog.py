@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from driven_station import FAR, HOT, SLOW, SOON_S, driver, leases_of, look, safe_within, told
+from long_suites import mostly_slow
 from served_station import modbus_station, served
 from small_station import lot_of
 
@@ -34,7 +35,7 @@ def state(tmp_path, monkeypatch):
                 os.kill(int(process.name), signal.SIGKILL)
 
 
-@pytest.mark.parametrize("module", ["stations.watchdog", "stations.bringup.keeper"])
+@pytest.mark.parametrize("module", mostly_slow(["stations.watchdog", "stations.bringup.keeper"], "stations.watchdog"))
 def test_what_makes_a_device_safe_starts_without_libraries_of_tables(module: str) -> None:
     code = f"import sys, {module}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()

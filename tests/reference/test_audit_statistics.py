@@ -43,6 +43,7 @@ def test_charts_of_the_handbook():
     assert not chart.outside.any()
 
 
+@pytest.mark.slow
 def test_run_length_of_the_western_electric_rules_is_the_published_one(rng):
     signals = western_electric(rng.standard_normal(1_000_000), Baseline(0.0, 1.0))
     first_rule = np.flatnonzero(signals[0]).size
@@ -99,6 +100,7 @@ def test_gauge_study_of_the_manual():
     assert study.categories == 4
 
 
+@pytest.mark.slow
 def test_bissell_s_interval_covers_as_it_says(rng):
     """A second way: of 4000 samples of 50 normal values the interval holds the true Cpk 95 times in a hundred."""
     truth, n = 1.2, 50

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 
 from pipelines.diagnosis.imported_faces import COVERAGE, MODEL
 from pipelines.stages.fit import fit
@@ -60,7 +61,7 @@ def biases(rng, kind, hand_deg, lots):
 
 
 @pytest.mark.parametrize("hand_deg", [0.0, HAND_DEG])
-@pytest.mark.parametrize("kind", ["white", "flicker", "walk"])
+@pytest.mark.parametrize("kind", mostly_slow(["white", "flicker", "walk"], "flicker"))
 @pytest.mark.parametrize(("lots", "least"), [(12, 0.83), pytest.param(200, 0.93, marks=pytest.mark.slow)])
 def test_the_bias_of_six_faces_lies_within_its_uncertainty(rng, kind, hand_deg, lots, least):
     """By two degrees of freedom of each output alone 81 % did; a tilt, which looks like wander, makes U twice what it need be."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial import poses
 from inertial.fits.wander import fit_lot_with_wander, student
@@ -54,7 +55,7 @@ def within(values):
     return np.mean(np.abs(values) < 2.0)
 
 
-@pytest.mark.parametrize("units", [1, 4])
+@pytest.mark.parametrize("units", mostly_slow([1, 4], 4))
 @pytest.mark.parametrize("kind", WHITE_AND_MIXED)
 def test_six_faces_are_as_good_as_they_say(rng, kind, units):
     """Taken for white, the scatter of so few dwells left half of the biases outside two standard errors."""

@@ -10,6 +10,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 from independent_budget import PRODUCTION, columns, draws, fitted, nominal_force, outputs
+from long_suites import mostly_slow
 from posed import posed
 
 from inertial import design, poses
@@ -254,7 +255,7 @@ def test_a_rotation_of_the_whole_unit_is_no_error_in_its_own_frame() -> None:
     assert 1e6 * np.max(np.abs(own)) < 2.0
 
 
-@pytest.mark.parametrize(("plan", "trials"), [("six", 3300), ("fib", 3300)])
+@pytest.mark.parametrize(("plan", "trials"), mostly_slow([("six", 3300), ("fib", 3300)], ("fib", 3300)))
 def test_a_monte_carlo_of_an_independent_station_agrees_to_5_percent(plan: str, trials: int) -> None:
     """JCGM 101 with a forward model and a fit of its own; two standard errors of a deviation are 2.5 %."""
     name, temperatures = PLANS[plan]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial.disturbances import disturbances
 
@@ -35,7 +36,7 @@ NOISE: dict[str, Callable[[np.random.Generator, int], np.ndarray]] = {
 }
 
 
-@pytest.mark.parametrize("kind", NOISE)
+@pytest.mark.parametrize("kind", mostly_slow(NOISE, *list(NOISE)[::3]))
 def test_nothing_is_told_of_noise_drift_and_waves(kind: str) -> None:
     told = []
     for k in range(20):

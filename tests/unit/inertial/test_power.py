@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from inquiries import job_of
+from long_suites import mostly_slow
 from lots import dwell_rows
 
 from inertial import effects as catalogue
@@ -127,7 +128,7 @@ def test_a_jump_of_the_bias_at_a_power_on_is_nothing_that_is_missing(rng):
     assert [diagnosed(one, jumps, rng).adequate for one in (state, same)] == [True, False]
 
 
-@pytest.mark.parametrize("truth", ["warm_up", "aging_log"])
+@pytest.mark.parametrize("truth", mostly_slow(["warm_up", "aging_log"], "warm_up"))
 def test_what_happens_after_a_power_on_parts_warm_up_from_ageing(truth, rng):
     state = switched_off(run_of(powered=300.0), 900.0, 60)
     time, since = state.time, state.since_power

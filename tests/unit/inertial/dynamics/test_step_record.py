@@ -63,6 +63,7 @@ def test_settling_and_overshoot_of_a_record_are_the_published_ones(zeta: float, 
     assert 100.0 * figures.overshoot == pytest.approx(PUBLISHED[zeta][3], abs=0.06)
 
 
+@pytest.mark.slow
 def test_the_pulls_of_the_figures_have_unit_variance() -> None:
     time, clean = recorded(0.65)
     true = step_figures(time, clean, np.full(len(time), 1e-6), band=0.02)

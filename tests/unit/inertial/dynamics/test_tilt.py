@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from scipy.stats import binom, chi2, norm
 
 from inertial.dynamics.tilt import TiltFit, fit_tilt, magnitude
@@ -47,7 +48,9 @@ def test_errors_of_the_table_that_both_axes_share_count_once(rng: np.random.Gene
     assert not low < np.std(apart, ddof=1) < high
 
 
-@pytest.mark.parametrize(("k2", "k3"), [(0.0, 0.0), (0.0, 2e-4), (8e-4, 1.6e-3), (-8e-4, 1.6e-3)])
+@pytest.mark.parametrize(
+    ("k2", "k3"), mostly_slow([(0.0, 0.0), (0.0, 2e-4), (8e-4, 1.6e-3), (-8e-4, 1.6e-3)], (-8e-4, 1.6e-3))
+)
 def test_the_departure_by_tilt_is_that_of_the_curve(k2: float, k3: float, rng: np.random.Generator) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 3601)[:-1]
     force = np.sin(angle)

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 
 from inertial.errors import NotIdentified
 from inertial.fits import plane
@@ -40,7 +41,7 @@ def test_the_axis_across_the_plane_is_found_and_general_orientations_have_none(r
         fit_plane(np.ones((3, 3)), np.eye(3), 1, np.arange(3.0), np.ones((3, 3)))
 
 
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("known", mostly_slow([True, False], False))
 def test_stated_intervals_hold_the_truth(rng: np.random.Generator, *, known: bool) -> None:
     """Standard errors of facts D for 24 equal steps: σ/√n of the bias, σ√(2/n) of the response; 15 records."""
     flat = upper(RESPONSE[np.ix_([0, 2], [0, 2])])

@@ -132,6 +132,7 @@ def flicker_means(rng: np.random.Generator, channels: int, n: int) -> np.ndarray
     return generate.flicker(rng, (channels, FINE * (PAST + n)), 1.0).reshape(channels, -1, FINE).mean(axis=-1)[:, PAST:]
 
 
+@pytest.mark.slow
 def test_the_innovations_of_flicker_noise_are_white_and_as_large_as_stated(rng: np.random.Generator) -> None:
     n, runs = 1500, 8
     model = bias_model([0.05] * 3, [1.0] * 3, [0.0] * 3, [3.0] * 3, flicker_of_steps(1.0, n))

@@ -57,7 +57,7 @@ def lot(seed: int, wander: float, white: float = 1e-5) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize("seeds", mostly_slow([1, 2], 1))
-@pytest.mark.parametrize("wander", [0.0, 2e-5])
+@pytest.mark.parametrize("wander", mostly_slow([0.0, 2e-5], 2e-5))
 def test_fit_and_diagnosis_find_the_same_noise(wander: float, seeds: int) -> None:
     """What each expects a right model to leave, µg: within a tenth of one another and of what is left indeed."""
     for seed in range(11, 11 + seeds):

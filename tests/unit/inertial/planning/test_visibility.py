@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from posed import posed
 
 from inertial import poses
@@ -72,7 +73,7 @@ def drawn(preset, state):
     return state.force + np.stack(means, axis=1)
 
 
-@pytest.mark.parametrize("name", ["SF1500", "ADXL355", "analogue"])
+@pytest.mark.parametrize("name", mostly_slow(["SF1500", "ADXL355", "analogue"], "ADXL355"))
 def test_errors_of_a_lots_fits_are_those_that_the_plan_let_expect(name):
     preset, state = load_preset(name), course()
     noise = DwellNoise(

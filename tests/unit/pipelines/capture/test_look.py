@@ -1,6 +1,7 @@
 """A capture that looks at its records: it ends where the look says so, and a resumed one asks nothing again."""
 
 import pytest
+from long_suites import mostly_slow
 from small_station import MemorySink, lot_of, short_recipe
 
 from pipelines.capture.capture import capture
@@ -74,7 +75,7 @@ def test_dwells_on_a_ramp_keep_their_length() -> None:
     assert lengths == {2.0}
 
 
-@pytest.mark.parametrize("after", [2, 3])
+@pytest.mark.parametrize("after", mostly_slow([2, 3], 3))
 def test_a_resumed_capture_keeps_what_was_decided(after: int) -> None:
     whole, journal = MemorySink(), MemoryLog()
     captured(whole, journal, looks())

@@ -92,6 +92,7 @@ def lacking(table, unit, dwells):
     return table.drop(index=table.index[table["unit"] == unit].to_numpy()[dwells])
 
 
+@pytest.mark.slow
 def test_swapped_units_and_a_truncated_file_are_known(rng):
     table = lots.lot(rng)
     (line,) = fault_lines(diagnose(lacking(table, "U002", slice(50, None))))

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 from scipy import signal
 
 from pipelines.importers.inspection import inspect
@@ -81,7 +82,7 @@ def shocked(path, *, part=None, **columns):
     return import_waveforms([path], "shock", part, "S1", layout, str(path.parent / "archive"))
 
 
-@pytest.mark.parametrize("duration_ms", [0.5, 11.0])
+@pytest.mark.parametrize("duration_ms", mostly_slow([0.5, 11.0], 11.0))
 def test_a_pulse_is_found_by_itself(duration_ms, tmp_path, rng):
     path = shock_file(tmp_path / "drop.csv", rng, duration_s=1e-3 * duration_ms)
     assert "--procedure shock" in inspect([path]).document["command"]

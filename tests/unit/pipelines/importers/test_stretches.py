@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from benchmarks.rest_and_motion import ROWS, counted, found, made
 from pipelines.importers import stretches
@@ -26,10 +27,10 @@ def test_a_rest_beside_a_machine_is_a_rest_and_a_hand_in_motion_is_none_in_any_u
 
 @pytest.mark.parametrize(
     "row",
-    [
+    mostly_slow([
         "5 Hz 0.05 g in a third of the rests", "50 Hz 0.1 g in half of the rests", "rests of 9 samples",
         "back to back, 9 samples", "noise 20 mg", "held for 1.5 to 3 s in half of the moves", "waved, counts",
-    ],
+    ], "50 Hz 0.1 g in half of the rests", "back to back, 9 samples", "waved, counts"),
 )  # fmt: skip
 def test_stops_made_by_mechanics_are_found_and_motion_is_none(row: str) -> None:
     for seed in (11, 12):

@@ -7,6 +7,7 @@ import independent_noise as made
 import numpy as np
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 from lots import dwell_rows
 
 from inertial.noise.dwells import DwellNoise
@@ -73,7 +74,7 @@ NOISES = {
 }
 
 
-@pytest.mark.parametrize("name", ["white", pytest.param("flicker", marks=pytest.mark.slow), "flicker and walk"])
+@pytest.mark.parametrize("name", mostly_slow(["white", "flicker", "flicker and walk"], "flicker and walk"))
 def test_plan_and_fit_state_the_bias_s_uncertainty_alike_and_lots_scatter_no_more(name: str) -> None:
     noise = NOISES[name]
     scatter = scattered(noise, 20_261_130 + len(name))

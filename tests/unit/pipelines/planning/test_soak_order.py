@@ -4,6 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial import design
 from inertial.poses import plan
@@ -42,7 +43,7 @@ def context() -> PlanContext:
     return planned(UP_AND_DOWN)
 
 
-@pytest.mark.parametrize("factor", [1.3, 2.5])
+@pytest.mark.parametrize("factor", mostly_slow([1.3, 2.5], 2.5))
 def test_the_same_dwells_are_known_no_later(context: PlanContext, factor: float) -> None:
     required = factor * identified(context).errors
     found = ordered(context, required)

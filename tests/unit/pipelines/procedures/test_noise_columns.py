@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 from scipy.stats import chi2
 
 from inertial.dynamics.sine_fit import fit_tone_and_frequency
@@ -29,7 +30,7 @@ def shaken(rng: np.random.Generator, distortion: float, noise: float, tone_hz: f
     return np.cos(turn) + distortion * np.cos(2.0 * turn + 0.7) + noise * rng.normal(size=turn.size)
 
 
-@pytest.mark.parametrize("distortion", [0.0, 0.03])
+@pytest.mark.parametrize("distortion", mostly_slow([0.0, 0.03], 0.03))
 def test_distortion_of_the_exciter_is_not_noise_of_a_frequency(distortion: float, rng: np.random.Generator) -> None:
     errors = []
     for _ in range(200):

@@ -57,6 +57,7 @@ def test_the_residual_is_seen_against_what_the_effect_depends_on(hidden: str, qu
     assert len(fan) == 2  # a curve of each other unit
 
 
+@pytest.mark.slow
 def test_where_nothing_is_missing_the_residual_stands_alone_with_the_noise() -> None:
     view = first_of("")
     assert (view.effect, view.after, len(effect_chart(view).plots)) == ("", None, 1)

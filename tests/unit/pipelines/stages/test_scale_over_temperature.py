@@ -62,7 +62,7 @@ def dwells_of(made: PlantDevices, noise_ug: float, rng: np.random.Generator, uni
     return pd.concat(rows, ignore_index=True)
 
 
-@pytest.mark.parametrize("name", mostly_slow(PRESETS, PRESETS[0]))
+@pytest.mark.parametrize("name", mostly_slow(PRESETS))
 def test_a_lot_without_hidden_physics_is_adequate_at_a_microg_with_axes_that_lean_by_20_mrad(name: str) -> None:
     document = diagnose(dwells_of(devices(name, 71), 1.0, np.random.default_rng(71)), None, MODEL)
     assert document["adequate"], (document["error"]["p_value"], [c["effects"] for c in document["classes"]])

@@ -33,6 +33,7 @@ def page(client: AsgiClient, address: str) -> str:
     return answer.text
 
 
+@pytest.mark.slow
 def test_five_hundred_units_are_found_and_paged(top: Path, client: AsgiClient) -> None:
     assert "51 to 100 of" in page(client, "/units?search=MANY0&outcome=pass&page=2")
     assert re.search(r'href="/units\?[^"]*page=2[^"]*"[^>]*>\s*Next', page(client, "/units?search=MANY0&outcome=pass"))
