@@ -28,7 +28,8 @@ def fsync(fd: object) -> None:
 os.fsync = fsync
 threadpool_limits(1)  # small matrices take six times as long where the threads of several workers wait for each other
 pytest_plugins = ("left_open",)
-settings.register_profile("busy", deadline=None)  # other work on the machine decides how long a case takes
+# other work on the machine decides how long a case takes
+settings.register_profile("busy", deadline=None, max_examples=40)
 settings.load_profile("busy")
 
 FOLDERS = ("unit", "property", "contract", "reference", "faults", "e2e", "blind")

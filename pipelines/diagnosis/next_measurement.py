@@ -85,7 +85,7 @@ def _breaker(group: EffectClass) -> NextMeasurement:
     """A row without steps, for a class that no steps of the station separate: it states what would."""
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
-    steps = "" if group.of_data else "no steps of the station are certain to separate them; needed:  "
+    steps = "" if group.of_data else "no steps of the station are certain to separate them; needed: "
     why = f"{first.id} | {second.id}: {steps}{second.breaker}"
     return _without_steps(why)
 

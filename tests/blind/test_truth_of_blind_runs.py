@@ -83,6 +83,7 @@ def test_fresh_run_has_the_same_effects_and_units_under_new_noise():
     assert abs(alike[1]) < 0.1
 
 
+@pytest.mark.slow
 def test_invisible_effects_leave_no_trace_under_their_plan():
     for index in range(6):
         run = case("invisible", index, 2)
@@ -98,6 +99,7 @@ def test_station_effect_is_the_same_in_every_unit():
     assert np.abs(added - added.mean(axis=0)).max() < 0.02 * np.abs(added).max()
 
 
+@pytest.mark.slow
 @each(FAULT_NAMES)
 def test_fault_changes_its_own_unit_only_and_leaves_the_fresh_run_clean(fault):
     plain = {"plan": "twenty_six", "soaks": "five", "units": 5, "device": "counts"}

@@ -240,6 +240,7 @@ def test_large_lots_stand_out_no_more_than_small_ones(rng, differing):
     assert odd_lots <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "counted"), mostly_slow([(60, 20), (200, 160)], (60, 20)))
 def test_charts_in_control_are_found_out_of_it_as_rarely_as_is_said(rng, n, counted):
     """By mean and variance of the number of alarms a p-value of 6·10⁻⁴, that of eighteen charts, came up 16 times as often."""
@@ -256,6 +257,7 @@ def test_charts_in_control_are_found_out_of_it_as_rarely_as_is_said(rng, n, coun
     assert by_number[-1] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", mostly_slow([8, 16, 60], 8))
 def test_short_series_change_their_level_no_oftener_than_is_said(rng, n):
     """With σ from a few differences and the normal tail a p-value of 10⁻⁴ came up 30 times as often in eight points."""

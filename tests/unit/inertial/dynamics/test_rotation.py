@@ -174,6 +174,7 @@ def test_planes_that_leave_an_axis_still_and_too_few_readings_are_refused() -> N
         fit_sweep(np.arange(20.0), np.arange(20.0), 0.0, 2.0 * np.pi)
 
 
+@pytest.mark.slow
 def test_uncertainties_hold_in_coloured_noise() -> None:
     points = rotations(planes=["xy", "yz"])
     clean, rng = true_output(points), np.random.default_rng(6)

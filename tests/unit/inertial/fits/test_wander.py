@@ -16,6 +16,7 @@ from inertial.state import State
 EFFECTS = ("bias", "scale", "misalignment")
 
 
+@pytest.mark.slow
 def test_a_pattern_of_the_table_hides_no_flicker_of_quiet_units() -> None:
     """Flicker of 30 µg under an error of the poses of 100 µg that every soak repeats: the bias scatters as is stated."""
     rng = np.random.default_rng(5)

@@ -50,6 +50,7 @@ def test_each_coefficient_comes_back_inside_its_interval(symbol: str) -> None:
     assert np.nanmean(terms.value[:, j]) == pytest.approx(truth, rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_minimum_over_0_664_is_only_a_bound_when_white_noise_and_random_walk_meet() -> None:
     n, k = 1e-4, 1e-6 * 100.0
     rng, shape = np.random.default_rng(12), (8, 120_000)

@@ -133,7 +133,7 @@ STEPS = st.lists(st.tuples(st.sampled_from(["certify", "supersede", "revoke"]), 
 
 
 @given(STEPS)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_no_two_calibrations_of_a_unit_hold_on_one_day_whatever_is_written(steps: list[tuple[str, str, str]]) -> None:
     events: list[LedgerEntry] = []
     for number, (action, start, until) in enumerate(steps, 1):

@@ -32,6 +32,7 @@ def test_white_noise_and_a_long_first_rest_are_adequate() -> None:
     assert all(d["classes"] == [] and d["unexplained"] is None for d in documents)
 
 
+@pytest.mark.slow
 def test_the_verdict_does_not_depend_on_the_unit_of_the_samples() -> None:
     dwells = make(Recording(30), 5).dwells
     columns = [f"{kind}_{axis}" for kind in ("out", "sd") for axis in "xyz"]

@@ -55,7 +55,7 @@ exciters = st.just({"name": "exciter", "needed_for": ["exciter"], "change_min": 
 shared = st.lists(st.one_of(tables, coolers, exciters), max_size=3, unique_by=lambda one: one["name"])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=10, deadline=None)
 @drawn(st.integers(1, 3), st.lists(phases, min_size=1, max_size=4), shared, st.integers(0, 12), st.integers(1, 2))
 def test_a_schedule_keeps_every_rule(
     fixtures: int, lots: list[list[Phase]], shared: list, wait: int, people: int
@@ -67,7 +67,7 @@ def test_a_schedule_keeps_every_rule(
     assert found.bound <= max(ends) <= found.makespan
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @drawn(st.integers(1, 3), st.lists(phases, min_size=1, max_size=3), shared)
 def test_work_by_hand_lies_in_shifts(fixtures: int, lots: list[list[Phase]], shared: list) -> None:
     shifts = {"shifts": ["08:00-08:05", "23:58-00:02"]}

@@ -47,6 +47,7 @@ def test_a_channel_that_stands_still_has_no_frequency() -> None:
     assert (abs(tone.value[0]), tone.frequency_error) == (0.0, np.inf)
 
 
+@pytest.mark.slow
 def test_distortion_of_the_exciter_is_not_noise_of_a_point_of_a_sweep(rng: np.random.Generator) -> None:
     part = SweepPart(kind="sweep", repeatability_percent=0.0, repeatability_deg=0.0, transverse_percent=0.0)
     device = Device({}, {}, 50.0, "V")

@@ -64,6 +64,7 @@ def test_where_nothing_is_missing_the_residual_stands_alone_with_the_noise() -> 
     assert 0.5 < np.std(view.before[view.shown]) / view.floor < 2.0
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_model_is_seen_as_what_it_takes_off() -> None:
     dwells = make(World(units=3, soaks=(25.0,), repeats=2, hidden=(("third_order", 3.0),)), 41).dwells
     made = examination(dwells, None, [*MODEL, "third_order"])

@@ -47,6 +47,7 @@ def test_stated_uncertainties_are_the_standard_deviations_between_runs(name: str
     assert np.median(u_record) / np.sqrt(np.mean(np.square(wrong))) == pytest.approx(1.0, abs=within + 0.05)
 
 
+@pytest.mark.slow
 def test_the_standard_deviation_of_a_root_of_squares_agrees_with_drawn_numbers_and_is_none_of_no_noise() -> None:
     for sizes, error in product(
         ([1.0], [1.0] * 4, [1.0] * 30, [10.0, *[0.3] * 20], [5.0, 3.0, 1.0, 0.2, 0.1]), (0.0, 30.0)
