@@ -1,19 +1,23 @@
 """Inputs for the judgement of a model: dwells with their temperature history, the model, and formulas."""
 
+import logging
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
 import pandas as pd
 
+from inertial.errors import UnknownEffect
 from pipelines.archive import Archive, Run
 from pipelines.importers.exchange import read_dwells, read_history
 from pipelines.importers.files import is_file
-from pipelines.jobs.model_files import chosen_effects, use_formulas, use_formulas_of
+from pipelines.jobs.model_files import changed_effects, chosen_effects, use_formulas, use_formulas_of
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 from schemas.recipe import FormulaSpec
 
+LOGGER = logging.getLogger("tumbleline.diagnosis")
 WHY = "entered as a formula"
 
 
@@ -62,6 +66,9 @@ def judged_effects(source: str, archive: str | None, listed: str, model: Path | 
 def effects_of(run: Run) -> list[str] | None:
     """Effects of the model of a run, with its formulas in the catalogue; None if it has no model."""
     use_formulas_of(run)
+    with suppress(UnknownEffect):  # refused with what to give where the model is made
+        for name in changed_effects(run):
+            LOGGER.warning("run %s: %s was fitted with another state of its file; this one is judged", run.id, name)
     return list(run.about.get("recipe", {}).get("effects", ())) or None
 
 

@@ -95,15 +95,19 @@ def effect_file_hashes(names: Iterable[str]) -> dict[str, str]:
     return {name: files.sha256(Path(str(sys.modules[module].__file__))) for name, module in of_files.items()}
 
 
+def changed_effects(run: Run) -> list[str]:
+    """Effects of effect files that have another state than those that the coefficients of a run are of."""
+    parameters = run.manifest("coefficients")["parameters"] if "coefficients" in run.tables() else {}
+    fitted = parameters.get("effect_files", {})
+    return [name for name, now in effect_file_hashes(fitted).items() if now != fitted[name]]
+
+
 def use_fitted_model(run: Run, effect_files: Iterable[Path] | None) -> None:
     """Add the effects that the coefficients of a run are of to the catalogue; refuse a file that is not that of the fit."""
     for path in effect_files or ():
         effects.add_file(path)
     use_formulas_of(run)
-    fitted = (
-        run.manifest("coefficients")["parameters"].get("effect_files", {}) if "coefficients" in run.tables() else {}
-    )
-    if other := [name for name, now in effect_file_hashes(fitted).items() if now != fitted[name]]:
+    if other := changed_effects(run):
         raise WrongUse(
             f"run {run.id}: {other[0]} was fitted with another state of the effect file, which its coefficients belong to; give "
             f"the file of that fit, or fit again with this one: 'tumbleline fit {run.id} --effect-file FILE.py'"

@@ -16,6 +16,7 @@ from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
 from pipelines.archive import Archive
 from pipelines.diagnosis.import_document import import_document
+from pipelines.diagnosis.inputs import judged_effects
 from pipelines.importers.keep import complete_table
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange, change_from_options
@@ -244,7 +245,9 @@ class Glue(SensorEffect):
 """
 
 
-def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(tmp_path: Path) -> None:
+def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     """The archive had the coefficients of the earlier file below the verdict on the later one."""
     path, archive = tmp_path / "lot.csv", Archive(str(tmp_path / "archive"))
     table(np.random.default_rng(8)).to_csv(path, index=False)
@@ -261,6 +264,9 @@ def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(tmp_path: Path
             if power == 3:
                 with pytest.raises(WrongUse, match="another state of the effect file"):
                     use_fitted_model(archive.run(runs[0]), ())
+                caplog.clear()
+                assert judged_effects(runs[0], str(tmp_path / "archive"), "", None, "diagnose") == [*PLAIN, "glue"]
+                assert "another state of its file; this one is judged" in caplog.text
     assert runs[0] != runs[1] == runs[2]
     assert len(evidence) == 2  # what a release needs, too
     squared, cubed = (archive.run(name).table("coefficients").query("effect == 'glue'")["value"] for name in runs[:2])
