@@ -109,4 +109,4 @@ def did_you_mean(given: str, known: Iterable[str]) -> str:
     close = close_matches(given, names)
     if close:
         return f"did you mean {' or '.join(close)}?"
-    return f"known: {', '.join(names)}"
+    return f"known: {', '.join(names) or 'none'}"

@@ -19,7 +19,7 @@ from pipelines.audit.unit_drifts import UnitDrift, unit_drifts
 from pipelines.certificates.days import FIRST, today
 from pipelines.certificates.days import day_of as checked
 from pipelines.parallel import Distributor
-from schemas.errors import WrongUse
+from schemas.errors import WrongUse, did_you_mean
 
 LIMITED = {  # families with a limit of the value: figure, and units of the parameter per unit of the figure
     "bias": ("zero_g_offset_mg", 1e3),
@@ -156,6 +156,21 @@ def audit(
         odd=tuple(odd_ones(calibrations, period)),
         studies=tuple(study for study in studies(calibrations, good & inside, rules) if study.last_day >= scope.since),
     )
+
+
+def refuse_nothing(audited: Audit, root: str) -> None:
+    """Refuse an unknown name, and an archive without calibrations before the day."""
+    for switch, name, values in (
+        ("--device", audited.scope.device.upper(), audited.all.device),
+        ("--station", audited.scope.station, audited.all.station),
+    ):
+        if name and len(audited.all) and name not in values:
+            known = [str(label) for label in np.unique(values.astype(str))]
+            raise WrongUse(f"audit: {switch} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
+    if not len(audited.all) and not audited.problems:
+        raise WrongUse(
+            f"audit: {root} has no calibration in this time, one at least is needed; make a run, or give another --until"
+        )
 
 
 def _of_device(calibrations: Calibrations, scope: Scope) -> Flags:

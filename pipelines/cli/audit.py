@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, option
 from pipelines.cli.printing import conclude, remark, say, short
-from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
@@ -46,7 +45,7 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
-    from pipelines.audit.audit import audit, scope_of
+    from pipelines.audit.audit import audit, refuse_nothing, scope_of
     from pipelines.audit.document import document
     from pipelines.audit.findings import findings
     from pipelines.audit.rules import load_rules
@@ -57,7 +56,7 @@ def command(
     store.refuse_none()
     count = workers or processors()
     audited = audit(store, load_rules(rules), scope, distribute=on_dask(dask, count), workers=count)
-    _refuse_nothing(audited, str(store.root))
+    refuse_nothing(audited, str(store.root))
     audit_findings = findings(audited)
     if page is not None:
         from pipelines.archive.files import ELSEWHERE, publish
@@ -67,23 +66,6 @@ def command(
     show = partial(_show, audited, audit_findings, str(store.root), page)
     made = document(audited, audit_findings, str(store.root)) if as_json else {}
     conclude(made, show, as_json=as_json, passed=not audit_findings)
-
-
-def _refuse_nothing(audited: "Audit", root: str) -> None:
-    """Refuse an unknown name, and an archive without calibrations before the day."""
-    import numpy as np
-
-    for switch, name, values in (
-        ("--device", audited.scope.device.upper(), audited.all.device),
-        ("--station", audited.scope.station, audited.all.station),
-    ):
-        if name and len(audited.all) and name not in values:
-            known = [str(label) for label in np.unique(values.astype(str))]
-            raise WrongUse(f"audit: {switch} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
-    if not len(audited.all) and not audited.problems:
-        raise WrongUse(
-            f"audit: {root} has no calibration in this time, one at least is needed; make a run, or give another --until"
-        )
 
 
 def _show(audited: "Audit", audit_findings: "list[AuditFinding]", root: str, page: Path | None, _: object) -> None:

@@ -246,7 +246,8 @@ def _waveforms(
 
 def _named(units: Sequence[str], device: str | None) -> str:
     """The units of an import with their kind of device, where it is stated."""
-    return ", ".join(units) + (f" ({device})" if device else "")
+    listed = ", ".join(units) if len(units) <= 8 else f"{len(units)} units, {units[0]} to {units[-1]}"
+    return listed + (f" ({device})" if device else "")
 
 
 def _print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:

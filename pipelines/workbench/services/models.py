@@ -36,7 +36,7 @@ def path_of(settings: WorkbenchSettings, name: str) -> Path:
     """
     known = models(settings)
     if name not in known:
-        raise WrongUse(f"model: no file is called '{name[:60]}'; {did_you_mean(name, known or ['none'])}")
+        raise WrongUse(f"model: no file is called '{name[:60]}'; {did_you_mean(name, known)}")
     return settings.folder / FOLDER / f"{name}.toml"
 
 

@@ -87,7 +87,8 @@ def settled(settings: WorkbenchSettings, page: MissingPage) -> MissingPage:
     """The page with the source's own name, and with the starting model if none is given."""
     name = sources.resolve(settings, page.source, "source")
     effects = page.effects or _starting_model(settings.archive, name, sources.stamp(settings, name))
-    return page.model_copy(update={"source": name, "effects": effects})
+    fresh = "" if page.fresh == name else page.fresh
+    return page.model_copy(update={"source": name, "effects": effects, "fresh": fresh})
 
 
 @lru_cache(maxsize=64)

@@ -42,7 +42,7 @@ def resolve(settings: WorkbenchSettings, name: str, where: str) -> str:
     if name in files:
         return name
     if "/" in name or "\\" in name or name.endswith(ENDINGS):
-        raise WrongUse(f"{where}: no file '{name}' in {settings.folder}; {did_you_mean(name, files or {'none'})}")
+        raise WrongUse(f"{where}: no file '{name}' in {settings.folder}; {did_you_mean(name, files)}")
     return Archive(settings.archive).run(name).id
 
 

@@ -14,7 +14,7 @@ from pipelines.diagnosis.documents import DiagnosisDocument, VersionDocument
 from pipelines.drawing import Chart
 from pipelines.report.effect_view import EffectView
 from pipelines.report.residual_table import ResidualTable
-from schemas.errors import TumblelineError, WrongUse
+from schemas.errors import TumblelineError
 from schemas.installed import not_installed
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
@@ -223,7 +223,7 @@ def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
     report_progress(0, 2, "reading the runs")
     from pipelines.archive import Archive
     from pipelines.audit import pictures
-    from pipelines.audit.audit import audit, scope_of
+    from pipelines.audit.audit import audit, refuse_nothing, scope_of
     from pipelines.audit.document import document, furthest
     from pipelines.audit.findings import findings
     from pipelines.audit.rules import load_rules
@@ -231,10 +231,7 @@ def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
     scope = scope_of(*(str(request[name]) for name in ("since", "until", "device", "station")))
     archive_audit = audit(Archive(request["archive"]), load_rules(None), scope)
     report_progress(1, 2, "the evidence of its findings")
-    if not len(archive_audit.all) and not archive_audit.problems:
-        raise WrongUse(
-            f"audit: {request['archive']} has no calibration in this time, one at least is needed; make a run"
-        )
+    refuse_nothing(archive_audit, str(request["archive"]))
     charts: dict[str, Chart] = {}
     months = [share for share in archive_audit.yields if share.of == "month"]
     if months:

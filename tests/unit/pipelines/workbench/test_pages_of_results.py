@@ -46,6 +46,8 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
     _, content = requests.audit(settings_of(tmp_path / "archive", tmp_path), AuditPage())
     end, audited = done_in_process("audit", content, lambda *_: None)
     assert end == "done", audited
+    end, said = done_in_process("audit", {**content, "station": "nowhere"}, lambda *_: None)
+    assert (end, "--station 'nowhere' has no calibration" in said) == ("failed", True)
     capability = audited["document"]["population"]["capability"]
     figure, others = capability[0], capability[1:]
     assert others
@@ -83,6 +85,10 @@ def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch:
     assert rows[0].startswith("level,size_ug")
     assert rows[1].startswith("W02,")
     assert client.get("/discover/levels-D7.csv").status_code == 422
+    document = found["document"]
+    found["document"] = {**document, "discoveries": [], "pooled": {**document["pooled"], "lots": 0}}
+    found["unexplained"] = []
+    assert "No lot can be compared" in client.get("/discover").text
 
 
 @pytest.mark.parametrize(
@@ -131,7 +137,11 @@ def test_a_unit_has_figures_and_coefficients_with_u_once_and_residuals_against_w
     ungraded = client.get(f"/unit?run={run.id}&unit=A1").text
     assert "No model was fitted" not in ungraded
     assert f"<code>tumbleline fit {run.id} --limits consumer --archive" in ungraded
-    assert f"<code>tumbleline show {run.id} --report --archive" in client.get(f"/run?run={run.id}").text
+    page = client.get(f"/run?run={run.id}").text
+    assert f"<code>tumbleline show {run.id} --report --archive" in page
+    assert f'href="/unit?run={run.id}&amp;unit=A1"' in page
+    same = MissingPage(source="latest", fresh=run.id)  # what was the fresh run is chosen as the dwells
+    assert requests.settled(settings_of(run.archive.root, tmp_path), same).fresh == ""
     assert "certificate issue" not in ungraded
 
 
@@ -168,6 +178,8 @@ def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_
     rows = results[key_of(*works[2])]
     scale = next(row for row in rows if row["effect"] == "scale")
     assert abs(scale["over_a"]) > 2.0  # what the cubic gave to the scale factor
+    results[key_of(*works[0])].document["influence"][0]["share"] = 0.000432  # as in a lot of hundreds of units
+    assert ">0.0432<" in client.get(requests.two_models(settings, state)[0].address()).text
     change, expanded = with_uncertainty(scale["change"], 2.0 * scale["u_b"])
     assert f"{change}<br><small>± {expanded}</small>" in text
     assert "By chance, up to one row in twenty exceeds it" in text
