@@ -156,4 +156,6 @@ def reason_of(detail: ErrorDetails) -> str:
         needed = f"{context['min_length']} or more {what} are needed; fill it in"
     if detail["type"] == "string_type":
         needed = "a text in quotes is needed; correct it"
+    if detail["type"] in {"list_type", "tuple_type"}:
+        needed = "a list in brackets is needed, as [1, 2]; correct it"
     return needed or detail["msg"].removeprefix("Value error, ")

@@ -196,6 +196,7 @@ def odd_ones(calibrations: Calibrations, chosen: Flags) -> list[Odd]:
         usable = np.isfinite(values).any(axis=0)
         if rows.size < FEWEST or not usable.any():
             continue
+        values = np.where(usable, values, 0.0)  # a parameter that no unit has is alike in all
         lots = _odd_lots(calibrations, device, rows, values)
         out += [*lots, *_odd_units(calibrations, device, rows, values, {lot.run for lot in lots})]
     return sorted(out, key=lambda odd: (odd.kind, -abs(odd.z), odd.name))

@@ -97,14 +97,19 @@ def flow_run(archive: Archive, name: str, meanwhile: Callable[[], None] = lambda
 
 @contextmanager
 def _answering() -> Generator[None]:
-    """A block whose orchestrator may end: the user is told what to do."""
-    from httpx import TransportError
+    """A block whose orchestrator may end, or no longer write its database: the user is told what to do."""
+    from httpx import HTTPStatusError, TransportError
 
     try:
         yield
-    except TransportError as problem:
-        fault = f"{os.environ['PREFECT_API_URL']} no longer answers ({problem}), a running server is needed"
-        raise LinkLost(f"orchestrator: {fault}; start it, and give the command again to continue") from None
+    except (TransportError, HTTPStatusError) as problem:
+        fault = f"no longer answers ({problem}), a running server is needed; start it"
+        if isinstance(problem, HTTPStatusError):
+            if not problem.response.is_server_error:
+                raise
+            fault = "answers with a fault of its own, as where the disk of its database is full; make room"
+        address = os.environ["PREFECT_API_URL"]
+        raise LinkLost(f"orchestrator: {address} {fault}, and give the command again to continue") from None
 
 
 def _prepare(job: Job) -> None:

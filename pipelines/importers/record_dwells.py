@@ -21,6 +21,8 @@ from schemas.foreign import shown
 FEWEST_FITTED = 12
 """Smallest number of dwells of a unit for the fit; the fit of a model with more coefficients states a larger one."""
 _SEED = 140
+_TURNS_DEG = 1.0
+"""Largest turn of a reference angle within a dwell: sin of the mean differs from the mean of sin by 13 µg then."""
 
 
 def dwell_numbers(labels: Sequence[str], serials: Sequence[str]) -> tuple[Index, tuple[str, ...]]:
@@ -60,6 +62,7 @@ def dwells_of_stretches(
     turning = [name == TILT or (name in BY_COLUMN and BY_COLUMN[name].unit == "°") for name in extras]
     angles = m + np.flatnonzero(turning)
     parts = [_of_one_turn(recorded[rows], angles) for rows in inside]
+    _refuse_turning(parts, [m + k for k, name in enumerate(extras) if name in (TILT, *ANGLE_COLUMNS)], numbers)
     mean = np.stack([part.mean(axis=0) for part in parts])
     sd = np.stack([part[:, :m].std(axis=0, ddof=1) if len(part) > 1 else np.zeros(m) for part in parts])
     frame = pd.DataFrame(
@@ -88,6 +91,18 @@ def _of_one_turn(samples: Array, angles: Index) -> Array:
     return samples
 
 
+def _refuse_turning(parts: Sequence[Array], angles: Sequence[int], numbers: Index) -> None:
+    """Refuse a dwell during which a reference angle turns: at a turning point of the output, motion looks like rest."""
+    for part, number in zip(parts, numbers.tolist(), strict=True):
+        half = len(part) // 2
+        turned_by = 2.0 * np.abs(part[half:, angles].mean(axis=0) - part[:half, angles].mean(axis=0)).max(initial=0.0)
+        if half and turned_by > _TURNS_DEG:
+            raise DataRejected(
+                f"import: the reference angle turns by {turned_by:.3g}° within dwell {number}, one position is needed; a "
+                "steady turn is read row by row with --set rows=dwells, positions need a shorter --set window_s"
+            )
+
+
 def finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     """The columns that every dwell has, and the reference if poses are stated."""
     frame = frame if "slot" in frame else frame.assign(slot=0)
@@ -96,7 +111,7 @@ def finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
         return _tilted(frame, mapping)
     if not (mapping.poses or mapping.face):
         complete_references(frame, "import")
-        return turned(frame, _gravity(mapping))
+        return turned(frame, mapping.norm_g or 1.0)
     if mapping.norm_g is None:
         raise WrongUse(
             "import: poses are stated, local gravity is needed with them; give --set local_gravity_m_s2=M/S2"
@@ -116,11 +131,6 @@ def turned(frame: pd.DataFrame, gravity: float = 1.0) -> pd.DataFrame:
     return _with_force(frame, frames.force_from_angles(outer, inner), gravity)
 
 
-def _gravity(mapping: Mapping) -> float:
-    """Local gravity, g; the standard value where it is not given."""
-    return 1.0 if mapping.norm_g is None else mapping.norm_g
-
-
 def _with_force(frame: pd.DataFrame, force: Array, gravity: float) -> pd.DataFrame:
     """The dwells with a force (n, 3), in units of local gravity, g."""
     return frame.assign(**{name: gravity * force[:, k] for k, name in enumerate(FORCE_COLUMNS)})
@@ -130,7 +140,7 @@ def _tilted(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     """The force of a single axis turned in one plane: g·sin of its angle above the horizontal along it, g·cos of it across."""
     angle = np.radians(frame[TILT].to_numpy(dtype=np.float64))
     force = frames.without_rounding(np.stack([np.sin(angle), np.cos(angle), 0.0 * angle], axis=-1))
-    return _with_force(frame.drop(columns=TILT), force, _gravity(mapping))
+    return _with_force(frame.drop(columns=TILT), force, mapping.norm_g or 1.0)
 
 
 def _held_out_count(text: str, dwells: int) -> int:

@@ -143,10 +143,18 @@ def transfer_points(content: Content, name: str, layout: PointsLayout) -> tuple[
         np.radians(value["phase_uncertainty"]),
     )
     told = [
-        f"{meaning} '{shown(column)}'{f' in {units[meaning]}' if units[meaning] else ''}"
+        f"{meaning} '{shown(column)}'{f' in {units[meaning]}' if units[meaning] else ''}{', a lag' * _lags(meaning, column)}"
         for meaning, column in found.items()
     ]
-    return points, "" if all(_own_name(meaning) in table.columns for meaning in found) else ", ".join(told)
+    unread = [f"'{shown(column)}'" for column in map(str, table.columns) if column not in {*found.values(), *OPTIONAL}]
+    told += [f"not read: {', '.join(unread)} (known besides: {', '.join(OPTIONAL)})"] if unread else []
+    as_known = not unread and all(_own_name(meaning) in table.columns for meaning in found)
+    return points, "" if as_known else ", ".join(told)
+
+
+def _lags(meaning: str, column: str) -> bool:
+    """Whether a column of phases counts the delay of the output as positive."""
+    return meaning == "phase" and re.search(r"(?<![a-z])lag", column.lower()) is not None
 
 
 def _own_name(meaning: str) -> str:
@@ -241,6 +249,8 @@ def _values(table: pd.DataFrame, column: str, where: str, meaning: str, unit: st
     value = finite_column(table, column, where, "correct the row") * UNITS[meaning][unit]
     if meaning == "magnitude" and unit == IN_DECIBEL:
         return np.exp(value)
+    if _lags(meaning, column):
+        return -value
     if meaning != "phase":
         advice = "a magnitude in dB needs --unit-of magnitude=dB" if meaning == "magnitude" else "correct the row"
         _refuse_not_positive(value, column, where, advice)

@@ -209,9 +209,8 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
     for p in diagnosis.extended.parameters:
         parameter = diagnosis.parameter(p.name)
         if p.log and not parameter.identified:
-            out.append(
-                ("not identified", f"{p.name}: 95 % interval {parameter.low:.4g} … {parameter.high:.4g} {p.unit}")
-            )
+            text = f"{p.name}: 95 % interval {parameter.low:.4g} … {parameter.high:.4g} {p.unit}"
+            out.append(("not identified", text.removesuffix(" 1")))
         elif p.name == "delay_s":
             text = f"{1e6 * parameter.value:.2f} µs, 95 % interval {1e6 * parameter.low:.2f} … {1e6 * parameter.high:.2f} µs"
             if parameter.rival is not None:

@@ -26,6 +26,7 @@ from pipelines.tables.frames import empty_table, joined_parts, picked
 from schemas.errors import DataRejected
 from schemas.units import MICRO
 
+MOST = 4000  # dwells of a unit: 2 GB and ten minutes, with the square and the cube of their number
 LONG_S = 3600.0  # shortest record whose random walk is extrapolated to a day, by a factor of about three at most
 
 
@@ -53,6 +54,11 @@ def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None 
     """:func:`fit` of tables that are shared with other stages."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
+    if (most := int(tables.dwells["unit"].value_counts().max())) > MOST:
+        needed = (
+            f"at most {MOST} are needed for their covariance; average neighbours, or import every {most // MOST + 1}th"
+        )
+        raise DataRejected(f"fit: {most} dwells of a unit, {needed}")
     done = [(lot, _fitted(lot, effects, family)) for lot in _lots(tables, effects)]
     return joined_parts([{**_rows(*part), "predictions": _prediction_rows(*part)} for part in done])
 

@@ -194,12 +194,13 @@ def test_shock_and_transverse_are_certified_beside_the_sweep_and_a_new_one_ends_
     assert {one["action"] for one in again["certified"]} == {"supersede"}
     states = {one.event.covers: one.state for one in Ledger(archive).calibrations("SF-1")}
     assert states == {"sweep": "valid", "transverse": "valid", "shock": "valid"}
-    document_of(
-        *("certificate", "write", "SF-1/2", "SF-1/4", "--archive", archive),
+    document_of(  # all that are valid at once
+        *("certificate", "write", "SF-1", "--archive", archive),
         *("--laboratory", folder / "laboratory.toml", "--output", folder / "more"),
     )
     shock = (folder / "more" / "SF-1_4.xml").read_text("utf-8")
     assert "sensitivity to shocks, departure from the scale" in shock
+    assert re.search(r"scale compared with: 0\.0\d+ V/g", shock)
     assert "bias after the shocks minus before" in shock
     assert "largest transverse sensitivity" in (folder / "more" / "SF-1_2.xml").read_text("utf-8")
     text_of("certificate", "revoke", "SF-1", "1", "--reason", "cable", "--archive", archive)

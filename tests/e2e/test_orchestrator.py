@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 import websockets
 from each import each
-from httpx import ConnectError
+from httpx import ConnectError, HTTPStatusError, Request, Response
 from in_process import refused
 from orchestrator import Orchestrator, client_of, served
 from root_process import ROOT
@@ -201,6 +201,9 @@ def test_a_client_with_no_key_a_wrong_one_or_no_server_is_told(
         check_server()
     with pytest.raises(LinkLost, match="no longer answers"), local._answering():
         raise ConnectError("refused")  # as of a server that was killed since
+    full = HTTPStatusError("", request=Request("GET", "http://a"), response=Response(500))
+    with pytest.raises(LinkLost, match="disk of its database is full; make room"), local._answering():
+        raise full
 
 
 def sent(line: Orchestrator, path: str, size: int, key: str, *, chunked: bool) -> int:

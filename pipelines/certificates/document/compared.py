@@ -66,7 +66,7 @@ def compared_content(run: Run, unit: str, sums: Sequence[Row]) -> ComparedConten
             if row["quantity"] in BUDGETS:
                 made.budgets[str(total["quantity"])] = _words(row)
         points = _points(run, unit, number)
-        made.methods.append(_method(part, rows, points))
+        made.methods.append(_method(part, rows, points, run))
         made.conditions += _conditions(part, points)
         if any(row["quantity"] == "response_magnitude" for row, _ in pairs):
             made.responses.append(_response(part, pairs, points, _curve(run, unit, number, pairs)))
@@ -94,11 +94,13 @@ def _points(run: Run, unit: str, number: int) -> pd.DataFrame:
     return rows[rows["series"].isin(["response", "across", "reference"]) & np.isfinite(rows["value"])]
 
 
-def _method(part: Any, rows: pd.DataFrame, points: pd.DataFrame) -> str:
+def _method(part: Any, rows: pd.DataFrame, points: pd.DataFrame, run: Run) -> str:
     procedure, axis = PROCEDURES[part.kind], str(rows["axis"].iloc[0])
     settings = rows.loc[rows["quantity"] == "response_magnitude", "setting"]
     if part.kind == "shock":
         where = f"{part.shocks * (2 if part.both_directions else 1)} half sines of {part.peak_g:g} g and {part.duration_ms:g} ms"
+        unit = run.table("readings")["out_unit"].iloc[0]
+        where += f"; scale compared with: {'the coefficients' if len(run.table('coefficients')) else f'{part.scale:g} {unit}/g'}"
     elif len(settings):
         where = f"{len(settings)} points from {settings.min():.4g} to {settings.max():.4g} Hz"
     else:

@@ -93,9 +93,7 @@ def issue(
     chosen, done = _chosen(archive, names)
     contents = [compose(Run(archive, calibration.run), calibration, known, who) for calibration, known in chosen]
     made: list[tuple[Calibration, dict[str, bytes]]] = []
-    for (calibration, _), content in zip(
-        chosen, contents, strict=True
-    ):  # all contents exist before any file is written
+    for (calibration, _), content in zip(chosen, contents, strict=True):  # all exist before any file is written
         xml = dcc(content)
         document = pdf(content, xml, address.replace("{number}", content.number))
         parts = {"xml": xml, "pdf": document}
@@ -121,8 +119,7 @@ def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibrat
         serial, _, number = name.rpartition("/") if "/" in name else (name, "", "")
         known = ledger.calibrations(serial)
         if known:
-            calibration = _of_unit(serial, known, number)
-            chosen[calibration.certificate] = calibration, known
+            chosen |= {entry.certificate: (entry, known) for entry in _of_unit(serial, known, number)}
         elif number or any(name in info.units for info in archive.runs()):
             raise WrongUse(f"certificate: unit {serial} has no certificate, one is needed; {_why(archive, serial)}")
         else:
@@ -130,15 +127,15 @@ def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibrat
     return list(chosen.values()), done
 
 
-def _of_unit(serial: str, known: list[Calibration], number: str) -> Calibration:
-    """The certificate of a unit with a number; without a number the last valid certificate, else the last."""
+def _of_unit(serial: str, known: list[Calibration], number: str) -> list[Calibration]:
+    """The certificate of a unit with a number; without a number all that are valid, one of each subject, else the last."""
     if number:
         meant = [calibration for calibration in known if str(calibration.event.sequence) == number]
         if not meant:
             listed = ", ".join(calibration.certificate for calibration in known)
             raise WrongUse(f"certificate: {serial}/{number} is not in the ledger, there are {listed}; give one of them")
-        return meant[0]
-    return next((calibration for calibration in reversed(known) if calibration.state == "valid"), known[-1])
+        return meant
+    return [calibration for calibration in known if calibration.state == "valid"] or known[-1:]
 
 
 def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibration, list[Calibration]]]:

@@ -92,6 +92,15 @@ def test_a_tumble_is_its_fourier_series(tmp_path):
     assert "x alone" in refused("export", plain["run"], "--format", "px4", "--archive", archive)
 
 
+def test_a_steady_turn_has_no_rest_at_its_turning_points(tmp_path):
+    angle = 24.0 * np.arange(0.0, 45.0, 0.01)
+    table = pd.DataFrame({"time_s": angle / 24.0, "angle_deg": angle, "volts": SCALE * np.sin(np.radians(angle))})
+    table.to_csv(tmp_path / "turn.csv", index=False)
+    words = ("--map", "time=time_s,x=volts,tilt=angle_deg", "--unit-of", "output=V", "--set", "axes=x", "--units", "S")
+    told = refused("import", tmp_path / "turn.csv", *words, "--archive", tmp_path / "archive")
+    assert "within dwell 0, one position is needed; a steady turn is read row by row with --set rows=dwells" in told
+
+
 @pytest.mark.parametrize(
     ("words", "needed"),
     [

@@ -92,9 +92,14 @@ def test_an_expanded_uncertainty_is_divided_by_the_factor_that_its_heading_state
     standard = pd.read_csv(written(tmp_path / "b.csv"))
     u, v = HEAD.split(",")[3:]
     expanded = standard.assign(**{u: 2.0 * standard[u], v: 2.0 * standard[v]})
-    expanded = expanded.rename(columns={u: f"U mag [%]{ending}", v: f"U phase [deg]{ending}"})
+    expanded["phase_deg"], expanded["Temp"] = -standard["phase_deg"], 23.0
+    names = {u: f"U mag [%]{ending}", v: f"U phase [deg]{ending}", "phase_deg": "Phase lag [deg]"}
+    expanded = expanded.rename(columns=names)
     expanded.to_csv(tmp_path / "k.csv", index=False)
     contents = Content(standard), read_content(tmp_path / "k.csv")[0]
-    of = [transfer_points(content, "b.csv", PointsLayout())[0] for content in contents]
+    of, told = zip(*(transfer_points(content, "b.csv", PointsLayout()) for content in contents), strict=True)
+    assert np.allclose(of[1].value, of[0].value)  # a lag is turned over
+    assert "'Phase lag [deg]' in deg, a lag, " in told[1]
+    assert "not read: 'Temp'" in told[1]
     assert np.allclose(of[1].magnitude_error, of[0].magnitude_error)
     assert np.allclose(of[1].phase_error, of[0].phase_error)

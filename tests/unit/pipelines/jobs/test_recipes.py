@@ -38,6 +38,7 @@ REFUSED: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     (POSES, "poses = [[70, 0], [90, 90], [80, 180], [90, -90], [85, 45]]",
      ("fit: poses span 0.34 g on z, the recipe needs 1.4 g; add poses with z up and z down",)),
     (POSES, 'poses = "twelve"\nspan_min_g = 1.5', ("span 1.41 g",)),
+    ("[0.0, 50.0]", '"50"', ("key 'temperatures_C': found '50': a list in brackets is needed, as [1, 2]",)),
     ("[0.0, 50.0]", "[0.0, 150.0]", ("temperatures_C", "150 °C", "-40 to 85 °C")),
     ("[105.0, -100.0]", "[105.0, -1000.0]", ("poses (inner)",)),
     ("settle_s = 2.0", "settle_s = 2.0\nsoak_min_s = 60.0", ("60 s", "900 s")),

@@ -69,8 +69,13 @@ def test_lack_of_fit_widens_the_uncertainty(run: Run) -> None:
     assert ratio > 3.0
 
 
-def test_units_with_different_dwells_or_units_of_output_are_not_fitted_together(run: Run) -> None:
+def test_units_with_different_dwells_or_units_of_output_are_not_fitted_together(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     dwells = run.table("dwells")
+    monkeypatch.setattr("pipelines.stages.fit.MOST", 7)
+    with pytest.raises(DataRejected, match=r"fit: \d+ dwells of a unit, at most 7 .* average neighbours"):
+        fit(dwells, NO_HISTORY, ["bias", "scale"])
     with pytest.raises(DataRejected, match="every unit needs every dwell"):
         lot_arrays(dwells.iloc[1:])
     dwells.loc[dwells["unit"] == "A2", "out_unit"] = "V"
