@@ -94,9 +94,9 @@ def _of_one_turn(samples: Array, angles: Index) -> Array:
 def _refuse_turning(parts: Sequence[Array], angles: Sequence[int], numbers: Index) -> None:
     """Refuse a dwell during which a reference angle turns: at a turning point of the output, motion looks like rest."""
     for part, number in zip(parts, numbers.tolist(), strict=True):
-        half = len(part) // 2
-        turned_by = 2.0 * np.abs(part[half:, angles].mean(axis=0) - part[:half, angles].mean(axis=0)).max(initial=0.0)
-        if half and turned_by > _TURNS_DEG:
+        half = max(len(part) // 2, 1)  # of a single sample both halves are the sample itself
+        turned_by = 2.0 * np.abs(part[-half:, angles].mean(axis=0) - part[:half, angles].mean(axis=0)).max(initial=0.0)
+        if turned_by > _TURNS_DEG:
             raise DataRejected(
                 f"import: the reference angle turns by {turned_by:.3g}° within dwell {number}, one position is needed; a "
                 "steady turn is read row by row with --set rows=dwells, positions need a shorter --set window_s"
