@@ -4,6 +4,7 @@ import json
 import shutil
 from collections.abc import Callable
 from datetime import timedelta
+from functools import cache
 from pathlib import Path
 
 import pyarrow as pa
@@ -42,24 +43,29 @@ def make(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The archive without a key, the one with a key, and the key."""
-    folder, archives = tmp_path_factory.mktemp("made"), {}
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The archive without a key or the one with a key, made when it is first asked for, and the key."""
+    folder = tmp_path_factory.mktemp("made")
     make_key(folder / "own.key")
-    for name, key in (("unsigned", ""), ("signed", str(folder / "own.key"))):
+
+    @cache
+    def of(name: str) -> Path:
+        if name == "own":
+            return folder / "own.key"
         (folder / name).mkdir()
         with pytest.MonkeyPatch.context() as patch:
-            patch.setenv(VARIABLE, key)
-            archives[name] = make(folder / name)
-    return {**archives, "own": folder / "own.key"}
+            patch.setenv(VARIABLE, str(folder / "own.key") if name == "signed" else "")
+            return make(folder / name)
+
+    return of
 
 
-@pytest.fixture(params=["unsigned", "signed"])
-def root(request: pytest.FixtureRequest, made: dict[str, Path], tmp_path: Path, monkeypatch) -> Path:
+@pytest.fixture(params=mostly_slow(["unsigned", "signed"], "unsigned"))
+def root(request: pytest.FixtureRequest, made: Callable[[str], Path], tmp_path: Path, monkeypatch) -> Path:
     """A copy of one of the two, looked at by its owner."""
-    monkeypatch.setenv(VARIABLE, str(made["own"]) if request.param == "signed" else "")
+    monkeypatch.setenv(VARIABLE, str(made("own")) if request.param == "signed" else "")
     monkeypatch.setattr(seals, "JUST_NOW", timedelta(0))
-    shutil.copytree(made[request.param], tmp_path / "archive")
+    shutil.copytree(made(request.param), tmp_path / "archive")
     return tmp_path / "archive"
 
 
@@ -292,7 +298,10 @@ SIGNED = (
 
 @pytest.mark.parametrize(
     ("root", "forge"),
-    [*(("unsigned", forge) for forge in (*OF_A_RUN, *OF_THE_WHOLE)), *(("signed", forge) for forge in SIGNED)],
+    [
+        *(("unsigned", forge) for forge in (*OF_A_RUN, *OF_THE_WHOLE)),
+        *(pytest.param("signed", forge, marks=pytest.mark.slow) for forge in SIGNED),
+    ],
     indirect=["root"],
     ids=lambda one: getattr(one, "__name__", one),
 )

@@ -358,7 +358,8 @@ MANIFESTS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["one of each", "each"])
+@pytest.mark.slow
+@pytest.mark.parametrize("every", [False, True], ids=["one of each", "each"])
 def test_an_entry_of_another_kind_in_a_manifest_is_found_and_stops_nothing(copy: Path, *, every: bool) -> None:
     """Every name with one of the kinds in turn; in the slow suite with each of them."""
     for pattern in MANIFESTS:
