@@ -238,7 +238,6 @@ def test_values_of_the_xml_are_those_of_the_archive_in_si_units(made: Run, xml: 
     assert si_unit("furlong") is None
 
 
-@pytest.mark.slow
 def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today(tmp_path: Path) -> None:
     first = small_run(tmp_path)
     first.seal()
