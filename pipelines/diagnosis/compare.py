@@ -154,8 +154,11 @@ def _same_units(first: Measured, fresh: Measured) -> Measured:
             "give a fresh run of the same units, or leave the others out of both files"
         )
     known, rows = (np.nan_to_num(run.readings.output).reshape(-1, 3).tolist() for run in (first, fresh))
-    if 2 * len({*map(tuple, rows)} & {*map(tuple, known)}) > len(rows):
-        raise DataRejected("compare: most dwells of the fresh run are dwells of the fit; give another measurement")
+    if 2 * (same := len({*map(tuple, rows)} & {*map(tuple, known)})) > len(rows):
+        raise DataRejected(
+            f"compare: {same} of {len(rows)} dwells of the fresh run have exactly the outputs of dwells of the fit, another "
+            "measurement is needed; give that one, or outputs with more digits where these are rounded"
+        )
     return fresh.pick([fresh.units.index(u) for u in first.units])
 
 

@@ -55,10 +55,8 @@ def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None 
     if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
     if (most := int(tables.dwells["unit"].value_counts().max())) > MOST:
-        needed = (
-            f"at most {MOST} are needed for their covariance; average neighbours, or import every {most // MOST + 1}th"
-        )
-        raise DataRejected(f"fit: {most} dwells of a unit, {needed}")
+        fewer = f"average neighbours, or import one of {most // MOST + 1}"
+        raise DataRejected(f"fit: {most} dwells of a unit, at most {MOST} can be fitted together; {fewer}")
     done = [(lot, _fitted(lot, effects, family)) for lot in _lots(tables, effects)]
     return joined_parts([{**_rows(*part), "predictions": _prediction_rows(*part)} for part in done])
 

@@ -251,7 +251,8 @@ RULES = {
 
 
 # each by itself: tests/unit/pipelines/chain/test_certify.py and tests/faults/test_archive_trouble.py
-@pytest.mark.parametrize("words", [pytest.param(one, marks=[pytest.mark.slow]) for k, one in enumerate(RULES)])
+@pytest.mark.slow
+@pytest.mark.parametrize("words", RULES)
 def test_the_rules_of_the_budget_hold_for_an_import(words: str) -> None:
     Path("lab.toml").write_text(REFERENCES.replace(*RULES[words]), encoding="utf-8")
     fitted = document_of("fit", document_of(*hand_held(*STATED))["run"], "--limits", "limits.toml")

@@ -264,12 +264,17 @@ def test_what_a_device_with_one_axis_cannot_do_is_said(
     assert not (tmp_path / "archive").exists()
 
 
-def test_its_waveforms_have_one_channel(measured, tmp_path: Path) -> None:
-    folder, runs = measured
-    path = tmp_path / "one.csv"
+@pytest.mark.parametrize(("which", "letters"), mostly_slow([("three", "xyz"), ("one", "x")], ("one", "x")))
+def test_its_waveforms_have_one_channel(
+    request: pytest.FixtureRequest, tmp_path: Path, which: str, letters: str
+) -> None:
+    folder, runs = request.getfixturevalue("both" if which == "three" else "measured")
+    path = tmp_path / f"{which}.csv"
     words = ("--waveforms", "0", "--archive", folder / "archive", "--output", path)
-    assert "".join(text_of("export", runs["one"], *words).split()).endswith("one.csv:SF-01x")
-    assert [column.split(" [")[0] for column in pd.read_csv(path).columns] == ["time", "SF-01 x"]
+    said = "".join(text_of("export", runs[which], *words).split())
+    names = [f"SF-01 {letter}" for letter in letters]
+    assert said.endswith(f"{path.name}:{','.join(names)}".replace(" ", ""))
+    assert [column.split(" [")[0] for column in pd.read_csv(path).columns] == ["time", *names]
 
 
 def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(

@@ -102,12 +102,9 @@ def stopped_many_times(times, seed):
     assert not {"left_safe", "not_safe"} & set(kinds)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("times", "seed"),
-    [
-        pytest.param(1, 11, marks=pytest.mark.slow),
-        pytest.param(rounds(30, 100), 12, marks=[pytest.mark.slow, pytest.mark.timeout(3600)]),
-    ],
+    ("times", "seed"), [(1, 11), pytest.param(rounds(30, 100), 12, marks=pytest.mark.timeout(3600))]
 )
 def test_no_order_comes_after_the_safe_state_when_a_run_that_stood_still_wakes(times, seed):
     stopped_many_times(times, seed)

@@ -99,8 +99,8 @@ def _method(part: Any, rows: pd.DataFrame, points: pd.DataFrame, run: Run) -> st
     settings = rows.loc[rows["quantity"] == "response_magnitude", "setting"]
     if part.kind == "shock":
         where = f"{part.shocks * (2 if part.both_directions else 1)} half sines of {part.peak_g:g} g and {part.duration_ms:g} ms"
-        unit = run.table("readings")["out_unit"].iloc[0]
-        where += f"; scale compared with: {'the coefficients' if len(run.table('coefficients')) else f'{part.scale:g} {unit}/g'}"
+        stated = f"{part.scale:g} {run.table('readings')['out_unit'].iloc[0]}/g"
+        where += f"; scale compared with: {'the coefficients' if len(run.table('coefficients')) else stated}"
     elif len(settings):
         where = f"{len(settings)} points from {settings.min():.4g} to {settings.max():.4g} Hz"
     else:
