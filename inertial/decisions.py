@@ -106,6 +106,9 @@ Table at rest ± 20 µrad: nothing named in 20 runs, with 8 of 10 without it. `p
 16 such lots, and in 3 of 104 lots of eight units whose noise is their own.
 """
 
+SPREAD = 0.3
+"""Standard deviation between sensors of one lot, over the mean of the lot, that the price of an effect of sensors expects."""
+
 NAMED_BELOW = 3e-3
 """Probability of the chi-square, times the number of tests, below which a finding is reported; in addition to the price.
 

@@ -11,9 +11,11 @@ from inertial.criticism.noise_draws import NoiseDraws
 from inertial.decisions import CERTAIN_BELOW, DRAWS, ENOUGH
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import LARGE
-from inertial.estimation.likelihood import mean_share, scatter_of_poses, shared_noise
+from inertial.estimation.likelihood import common_fit, known_together, scatter_of_poses, several, shared_noise, together
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import log_p_value
+from inertial.estimation.space import Space
+from inertial.probability import log_f_tail
 
 _BATCH = 33
 _NUMBERS = 4_000_000
@@ -39,20 +41,29 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
 def _worst_look(field: Candidates, drivers: list[Driver], model: Model) -> tuple[float, int]:
     """Natural logarithm of the smallest p-value of all tests of a model's residuals, and the number of tests."""
     space = model.space
-    common = shared_noise(model)
-    of_poses = max(common, scatter_of_poses(model))
+    together_too = several(model)
+    of_poses = max(shared_noise(model), scatter_of_poses(model))
     worst, looks = 0.0, 0
     for candidate in _all_tests(field, drivers):
         gain = space.gain(candidate)
-        looks += gain.drop.size
-        for point, (drop, rank) in enumerate(zip(gain.drop.tolist(), gain.rank.tolist(), strict=True)):
-            log_p = log_p_value(space, drop, rank)
-            together = of_poses if candidate.shared else common
-            if log_p < worst and together > 1.0:
-                along = 1.0 if candidate.shared else mean_share(space, candidate, point, model.problem.per_unit)
-                log_p = log_p_value(space, drop * (1.0 - along * (1.0 - 1.0 / together)), rank)
+        # of the coefficients of all units, and of those that they share
+        looks += gain.drop.size * (1 if candidate.shared or not together_too else 2)
+        for point, (drop, of_all) in enumerate(zip(gain.drop.tolist(), gain.common.tolist(), strict=True)):
+            rank, of_mean = int(gain.rank[point]), int(gain.common_rank[point])
+            if candidate.shared or not together_too:
+                log_p = log_p_value(space, drop / (of_poses if candidate.shared else 1.0), rank)
+            elif (log_p := _smaller(space, drop, rank, of_all, of_mean)) < worst:
+                # φ beside the candidate: an effect common to all units must not count as shared noise
+                beside = together(space, space.residual - common_fit(space, candidate, point), errors=0.0)
+                log_p = _smaller(space, drop - of_all + of_all / beside, rank, of_all / beside, of_mean)
             worst = min(worst, log_p)
     return worst, looks
+
+
+def _smaller(space: Space, drop: float, rank: int, common: float, of_mean: int) -> float:
+    """The smaller log p-value: of the coefficients of all units, or of those that they share."""
+    of_common = float(log_f_tail(common / max(of_mean, 1), of_mean, known_together(space))) if of_mean else 0.0
+    return min(log_p_value(space, drop, rank), of_common)
 
 
 def _against_draws(draws: NoiseDraws, looks: Callable[[], Iterable[Candidate]], worst: float) -> float:

@@ -1,12 +1,12 @@
 """Influence of dwells on a verdict: their shares of the deviance, and the verdict without the most influential ones."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inertial.arrays import Array
 from inertial.data_errors.removed_dwells import model_without
-from inertial.estimation.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
+from inertial.estimation.likelihood import common_part, of_station, scatter_beside, shared_noise, weighed
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import fall, freedom
 from inertial.estimation.term import Term
@@ -90,6 +90,7 @@ def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> fl
     if rank == 0:
         return 0.0
     richer = model.with_term(term)
-    together = max(shared_noise(richer), scatter_of_poses(richer) if of_station(term) else 1.0)
-    common = along_mean(model, model.noise, term) * (1.0 - 1.0 / together)
-    return weighed(float(fall(space, gain)[0]) * (1.0 - common), rank, freedom(term)).log_p
+    common = replace(
+        common_part(space, term, rest.problem), noise=max(shared_noise(richer), scatter_beside(richer, term))
+    )
+    return weighed(float(fall(space, gain)[0]), rank, freedom(term), common=common).log_p

@@ -3,7 +3,7 @@
 Draws are stored as rows, (blocks, draws, n), so that groups of blocks fit into the cache and no series is transposed.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from inertial.data_errors.tails import heavy
 from inertial.decisions import LEAST_SHARE
 from inertial.estimation.bases import SEEN, eigen, inverse_roots
 from inertial.estimation.candidate import Candidate, times_rows
+from inertial.estimation.likelihood import known_together, several
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.shares import nearest_point, shares_at
@@ -90,10 +91,11 @@ class NoiseDraws:
                 if (look, point) not in self._directions:
                     if point not in spaces:
                         spaces[point] = self.model.at(Noise(self._shares(point), self.model.noise.scale))
-                    self._directions[look, point] = Directions.of(spaces[point], candidate)
+                    found = Directions.of(spaces[point], candidate, together=several(self.model))
+                    self._directions[look, point] = found
                 found = self._directions[look, point]
-                for drop, rank in zip(found.drops(along[..., draws]), found.ranks.tolist(), strict=True):
-                    after = dof[point] - rank
+                for drop, rank, known in found.drops(along[..., draws]):
+                    after = min(dof[point] - rank, known)
                     if rank and after > 0:
                         ratio = (drop / rank) / (np.maximum(total[draws] - drop, 1e-300) / after)
                         worst[draws] = np.minimum(worst[draws], log_f_tail(ratio, rank, after))
@@ -199,35 +201,44 @@ class NoiseDraws:
 class Directions:
     """Orthonormal directions of a candidate's columns beyond the model, for each value of its nonlinear parameters.
 
-    turn : (blocks, grid, p, p), transforms products of the columns with a series into those of the directions; one block if
-        the coefficients are shared; ranks : (grid,), number of directions
+    parts : for coefficients of each block, and for those by axis that all units share: (b, grid, p, p), which transforms products
+        of the columns with a series, summed to b blocks, into those of the directions; (grid,), the number of directions; and
+        the degrees of freedom of the noise of the sums
     """
 
-    turn: Array
-    ranks: Places
-    shared: bool
+    parts: tuple[tuple[Array, Places, float], ...]
 
     @staticmethod
-    def of(space: Space, candidate: Candidate) -> "Directions":
-        """The directions of a candidate in a space."""
+    def of(space: Space, candidate: Candidate, *, together: bool = False) -> "Directions":
+        """The directions of a candidate in a space; ``together``: also of coefficients that units share."""
         found = space.products(candidate)
-        left, squares = found.left, found.squares
-        if candidate.shared:
-            left, squares = left.sum(axis=0, keepdims=True), squares.sum(axis=0, keepdims=True)
-        size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
-        values, vectors = eigen(left / (size[..., :, None] * size[..., None, :]))
-        vectors = vectors * inverse_roots(values, SEEN**2)[..., None, :]
-        turn = np.swapaxes(vectors, -1, -2) / size[..., None, :]
-        return Directions(turn, (values > SEEN**2).sum(axis=(0, 2)), candidate.shared)
+        parts: list[tuple[Array, Places, float]] = []
+        both = {len(found.left): np.inf} | ({space.covariance.axes: known_together(space)} if together else {})
+        for blocks, known in ({1: np.inf} if candidate.shared else both).items():
+            left, squares = _summed(found.left, blocks), _summed(found.squares, blocks)
+            size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
+            values, vectors = eigen(left / (size[..., :, None] * size[..., None, :]))
+            vectors = vectors * inverse_roots(values, SEEN**2)[..., None, :]
+            parts.append(
+                (np.swapaxes(vectors, -1, -2) / size[..., None, :], (values > SEEN**2).sum(axis=(0, 2)), known)
+            )
+        return Directions(tuple(parts))
 
-    def drops(self, along: Array) -> Array:
-        """Reduction (grid, draws) of the sums of squares, from products (blocks, grid, p, draws) of draws and columns."""
-        if self.shared:
-            along = along.sum(axis=0, keepdims=True)
-        if self.turn.shape[-1] == 1:
-            return np.einsum("bg,bgd->gd", self.turn[..., 0, 0] ** 2, along[..., 0, :] ** 2)
-        turned = self.turn @ along
-        return np.einsum("bgpd,bgpd->gd", turned, turned)
+    def drops(self, along: Array) -> Iterator[tuple[Array, int, float]]:
+        """Reductions (draws,) of sums of squares, rank and degrees of freedom, from products (blocks, grid, p, draws)."""
+        for turn, ranks, known in self.parts:
+            onto = _summed(along, len(turn))
+            if turn.shape[-1] == 1:
+                drops = np.einsum("bg,bgd->gd", turn[..., 0, 0] ** 2, onto[..., 0, :] ** 2)
+            else:
+                turned = turn @ onto
+                drops = np.einsum("bgpd,bgpd->gd", turned, turned)
+            yield from ((drop, rank, known) for drop, rank in zip(drops, ranks.tolist(), strict=True))
+
+
+def _summed(values: Array, blocks: int) -> Array:
+    """Values (b, …) of all blocks, summed to one block, to one per axis, or as they are."""
+    return values if len(values) == blocks else values.reshape(-1, blocks, *values.shape[1:]).sum(axis=0)
 
 
 def _some_blocks(rows: Array) -> list[slice]:

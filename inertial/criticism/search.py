@@ -11,7 +11,7 @@ from inertial.criticism.jumps import jumps_in_place_of
 from inertial.decisions import CERTAIN_BELOW, CLASS_WIDTH, JUMPS_RARE, MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.estimation.alternative import Handling, OfOneDwell
 from inertial.estimation.candidate import Candidate
-from inertial.estimation.likelihood import likelihood_ratio, weighed
+from inertial.estimation.likelihood import common_at, likelihood_ratio, weighed
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise
 from inertial.estimation.penalty import cost_of_model, fall
@@ -253,14 +253,18 @@ def _best_first(
 def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[float, int]:
     """Best score of a candidate at a noise, and its index on the grid; zero if noise alone explains it."""
     falls = fall(space, gain)
-    point = int(np.argmax(falls))
-    if not gain.rank[point]:
-        return 0.0, point
     several = len(field.grids[name]) > 1 and field.looks_of(name) == 1
     nonlinear = len(field.grids[name][0]) if several else 0
-    ratio = weighed(float(falls[point]), int(gain.rank[point]), nonlinear, field.looks_of(name))
-    likely = ratio.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
-    return (0.0 if likely else ratio.score), point
+    best = 0.0, int(np.argmax(falls))
+    # the values that explain most in all units together are others where each unit shows little
+    for point in {best[1], int(np.argmax(gain.common))} if gain.by_block.size else {best[1]}:
+        if gain.rank[point]:
+            part = common_at(space, gain, point)
+            ratio = weighed(float(falls[point]), int(gain.rank[point]), nonlinear, field.looks_of(name), part)
+            likely = ratio.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
+            if ratio.score > best[0] and not likely:
+                best = ratio.score, point
+    return best
 
 
 def judge_refined(field: Candidates, model: Model, term: Term, noise: Noise | None = None) -> Rival:

@@ -124,7 +124,7 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
     """The curve that explains the lot better than chosen effects, and the effects that remain beside it; None if none does."""
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
     full = Model(base.problem, [*base.terms, *chosen], near=base.noise)
-    full_cost, base_cost = cost_of_model(full), cost_of_model(base)
+    base_cost = cost_of_model(base)
     every = _promising(base, field)
     promising = [s for s in every if s.name not in held]
     fits = list(zip(fit_curves(base, promising, [*_noises(base), full.noise]), promising, strict=True))
@@ -141,20 +141,29 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
         worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (base_cost - best.cost))
         best, remaining = _with_others(base, chosen, alike, best, worth)
     replaced = [t for t in chosen if t not in remaining]
-    if not replaced or best.cost + (decisions.CURVE_AHEAD / len(replaced) if len(replaced) < 3 else 0.0) >= full_cost:
+    ahead = decisions.CURVE_AHEAD / len(replaced) if 0 < len(replaced) < 3 else 0.0
+    if not replaced or best.cost + ahead >= _cost_beside(full, best):
         return None  # up to two effects have priority over a curve that is not clearly better
     # an effect with memory is also compared alone: its inexact shape often leaves residuals that further effects explain
     rivals = [t for t in replaced if t.effect.memory or len(replaced) == 1]
-    priority = any(_nearly_as_good(base, [*remaining, t], base_cost - best.cost) for t in rivals)
+    priority = any(_nearly_as_good(base, [*remaining, t], best) for t in rivals)
     return None if priority else (best, remaining)
 
 
-def _nearly_as_good(base: Model, terms: Sequence[Term], gain: float) -> bool:
+def _cost_beside(model: Model, curve: CurveFit) -> float:
+    """The cost of a model at its own noise or at that beside a curve, whichever is less.
+
+    Where few soaks leave the slow noise open, the two estimates of it differ, and the cost with them by more than any effect.
+    """
+    return min(cost_of_model(model), cost_of_model(model.held_at(curve.model.noise.shares)))
+
+
+def _nearly_as_good(base: Model, terms: Sequence[Term], curve: CurveFit) -> bool:
     """Whether effects, the last of which is in question, gain so nearly as much as a curve that they have priority."""
     # a curve over time can follow any memory of one run
     share = (3.0 if terms[-1].effect.memory else 1.0) * decisions.CURVE_SHARE
-    alone = cost_of_model(base) - cost_of_model(Model(base.problem, [*base.terms, *terms], near=base.noise))
-    return alone >= gain - max(decisions.CURVE_AHEAD, share * gain)
+    gain, alone = cost_of_model(base) - curve.cost, Model(base.problem, [*base.terms, *terms], near=base.noise)
+    return curve.cost >= _cost_beside(alone, curve) - max(decisions.CURVE_AHEAD, share * gain)
 
 
 def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:

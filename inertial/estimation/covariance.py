@@ -66,11 +66,13 @@ class Covariance:
     error : (blocks, n), white standard error of each dwell, g; infinite where a dwell is missing
     direction : (blocks, n, 3), unit vectors of the force where the measurement is its norm; None where it is one axis' output
     loudness : (n,), standard deviation of the noise of each dwell over the lot's; None where it is the same in all
+    axes : number of blocks of a unit
     """
 
     def __init__(
-        self, time: Array, error: Array, direction: Array | None = None, loudness: Array | None = None
+        self, time: Array, error: Array, direction: Array | None = None, loudness: Array | None = None, axes: int = 1
     ) -> None:
+        self.axes = axes
         self.there = np.isfinite(error)
         self.count = self.there.sum(axis=1)
         white = np.where(self.there, error, 0.0) ** 2

@@ -7,22 +7,24 @@ the coefficients of the term's columns C at their maximum, and V1 the better of 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 
-from inertial.arrays import NORMAL_MEDIAN, Array
-from inertial.decisions import TOGETHER, UNITS_TOGETHER
+from inertial.arrays import Array
+from inertial.decisions import SPREAD, TOGETHER, UNITS_TOGETHER
 from inertial.design import of_axes
 from inertial.estimation.alternative import Handling, by_block, pose_errors
-from inertial.estimation.bases import unit_columns
+from inertial.estimation.bases import SEEN, unit_columns
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.comparison import estimate, residuals
 from inertial.estimation.model import Model
-from inertial.estimation.noise_shares import Noise, deviance_of
+from inertial.estimation.noise_shares import deviance_of
 from inertial.estimation.penalty import freedom, price
-from inertial.estimation.space import Space
+from inertial.estimation.problem import Problem
+from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
-from inertial.probability import log_chi2_tail
+from inertial.probability import log_chi2_tail, log_f_tail
 
 _FEWEST_POSES = 10
 _QUANTILES = (0.5, 0.75, 0.9)
@@ -75,23 +77,54 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
     plain = restricted_deviance(model.space, model.space)
     dof = max(space.dof, 1)
     deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
-    along, nonlinear = along_mean(model, noises[best], term), freedom(term)
-    scatter = scatter_of_poses(richer) if of_station(term) else 1.0
+    common, nonlinear = common_part(space, term, model.problem), freedom(term)
+    scatter = scatter_beside(richer, term)
 
     def divided(shared: float) -> Ratio:
-        by = max(shared, scatter)
-        ratio = weighed(deviance * (1.0 - along * (1.0 - 1.0 / by)), rank, nonlinear, locations)
+        ratio = weighed(deviance, rank, nonlinear, locations, replace(common, noise=max(shared, scatter)))
         return replace(ratio, shared=shared, again=divided)
 
     # φ with the term in the model: an effect common to all units must not count as shared noise
     return divided(shared_noise(richer))
 
 
-def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1) -> Ratio:
-    """The ratio of a deviance with its price and its probability; ``nonlinear``: number of nonlinear parameters."""
-    coefficients = rank + nonlinear
-    paid = price(deviance, coefficients) + 2.0 * float(np.log(max(locations, 1)))
-    return Ratio(deviance, rank, paid, float(log_chi2_tail(deviance, coefficients)))
+@dataclass(frozen=True)
+class Common:
+    """The part of a reduction of the deviance that coefficients by axis common to all units give.
+
+    share : 0 … 1, of the reduction; rank : number of these coefficients; units : number of units with coefficients of their own
+    noise : φ, which divides this part; known : degrees of freedom of φ
+    """
+
+    share: float = 0.0
+    rank: int = 0
+    units: int = 1
+    noise: float = 1.0
+    known: float = 1.0
+
+
+def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1, common: Common = Common()) -> Ratio:
+    """The ratio of a deviance with its price and its probability.
+
+    Coefficients of units are their mean and the deviations from it, and each of the two has its own price: an effect that all
+    sensors of a design have needs evidence for a few coefficients, whatever the number of units. Sensors are never equal, so
+    that deviations far below :data:`SPREAD` of the mean count against an effect of the sensor.
+
+    Parameters
+    ----------
+    nonlinear : number of nonlinear parameters; locations : number of locations searched
+    """
+    mean, own = deviance * common.share / common.noise, deviance * (1.0 - common.share)
+    coefficients, locations_paid = rank + nonlinear, 2.0 * float(np.log(max(locations, 1)))
+    if common.units == 1 or not 0 < common.rank < rank:
+        deviance = mean + own
+        paid = price(deviance, coefficients) + locations_paid
+        return Ratio(deviance, rank, paid, float(log_chi2_tail(deviance, coefficients)))
+    spread = 1.0 + SPREAD**2 * max(deviance * common.share / max(common.rank, 1) - 1.0, 0.0) / common.units
+    paid = price(mean, common.rank + nonlinear) + price(own, rank - common.rank, spread) + locations_paid
+    of_mean = log_f_tail(mean / (common.rank + nonlinear), common.rank + nonlinear, common.known)
+    log_p = min(log_chi2_tail(mean + own, coefficients), of_mean)
+    return Ratio(mean + own, rank, paid, float(min(log_p + np.log(2.0), 0.0)))
 
 
 def restricted_deviance(contrasts: Space, left: Space) -> float:
@@ -104,21 +137,41 @@ def shared_noise(model: Model) -> float:
 
     It is estimated from the median of the squares, so that one wrong pose does not raise it.
     """
-    lot = model.problem.lot
-    units = lot.state.time.shape[0]
-    if units < 2 or lot.radial:
-        return 1.0
-    space = model.space
-    there = model.problem.covariance.there.reshape(units, model.problem.per_unit, -1)
-    left = space.residual.reshape(units, model.problem.per_unit, -1)
+    return together(model.space, model.space.residual, (0.5,)) if several(model) else 1.0
+
+
+def several(model: Model) -> bool:
+    """Whether a lot has several units in known poses."""
+    return model.problem.lot.state.time.shape[0] > 1 and not model.problem.lot.radial
+
+
+def together(
+    space: Space, residual: Array, quantiles: tuple[float, ...] = _QUANTILES, errors: float = TOGETHER
+) -> float:
+    """φ of whitened residuals (blocks, n) of several units, by the largest of some quantiles of the squares of their mean.
+
+    Pose errors act on some axes in some poses only, which the median alone does not show.
+
+    Parameters
+    ----------
+    errors : standard errors by which φ exceeds one; it is one otherwise
+    """
+    there = space.covariance.there.reshape(-1, space.covariance.axes, residual.shape[1])
+    left = residual.reshape(there.shape)
     count = there.sum(axis=0)
     mean = np.where(count > 1, left.sum(axis=0) / np.sqrt(np.maximum(count, 1)), np.nan)
     squares = mean[np.isfinite(mean)] ** 2
-    if squares.size < 10:
+    if squares.size < _FEWEST_POSES:
         return 1.0
-    lost = space.dof / max(int(model.problem.covariance.count.sum()), 1)
-    phi = float(np.median(squares)) / NORMAL_MEDIAN**2 / max(lost, 0.1)
-    return phi if phi > 1.0 + TOGETHER * 2.33 / np.sqrt(squares.size) else 1.0
+    lost = max(space.dof / max(int(space.covariance.count.sum()), 1), 0.1)
+    largest = 1.0
+    for quantile in quantiles:
+        normal = NormalDist().inv_cdf(0.5 + 0.5 * quantile)
+        phi = float(np.quantile(squares, quantile)) / normal**2 / lost
+        # standard error of a quantile of squares, over the quantile
+        error = np.sqrt(quantile * (1.0 - quantile) / squares.size) / (normal * NormalDist().pdf(normal))
+        largest = max(largest, phi if phi > 1.0 + errors * error else 1.0)
+    return largest
 
 
 def of_station(term: Term) -> bool:
@@ -154,27 +207,47 @@ def scatter_of_poses(model: Model) -> float:
     return float(largest)
 
 
-def along_mean(model: Model, noise: Noise, term: Term) -> float:
-    """Share, 0 … 1, of the reduction of the sum of squares by a term that is common to all units."""
-    lot = model.problem.lot
-    units = lot.state.time.shape[0]
-    if units < 2 or lot.radial:
-        return 0.0
+def common_part(space: Space, term: Term, problem: Problem) -> Common:
+    """The part of the reduction by a term, in the space of a model without it, that is common to all units."""
+    units = problem.lot.state.time.shape[0]
+    if units < 2 or problem.lot.radial:
+        return Common()
     if isinstance(term.effect, Handling) and "unit" in term.keywords:
-        return 1.0 / units
-    if term.shared:
-        return 1.0
-    return mean_share(model.at(noise), term.candidate(model.problem), 0, model.problem.per_unit)
+        return Common(1.0 / units)
+    return Common(1.0) if term.shared else common_at(space, space.gain(term.candidate(problem)), 0)
 
 
-def mean_share(space: Space, candidate: Candidate, point: int, axes: int) -> float:
-    """Share, 0 … 1, of the reduction by a candidate's columns at a point of its grid that is common to all units."""
-    columns = unit_columns(space.project(space.whiten(candidate.of_blocks[:, :, point, :])))[0]
-    inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=1e-4, hermitian=True)
-    fitted = columns @ (inverse @ (np.swapaxes(columns, -1, -2) @ space.residual[..., None]))
-    fitted = fitted[..., 0].reshape(-1, axes, fitted.shape[1])
-    total = float(np.sum(fitted**2))
-    return float(len(fitted) * np.sum(fitted.mean(axis=0) ** 2) / total) if total > 0.0 else 0.0
+def common_at(space: Space, gain: Gain, point: int) -> Common:
+    """The common part of a gain of coefficients of units, at a point of its grid."""
+    drop, blocks = float(gain.drop[point]), len(gain.by_block)
+    share = min(max(float(gain.common[point]) / drop, 0.0), 1.0) if drop > 0.0 else 0.0
+    units = max(blocks // space.covariance.axes, 1)
+    return Common(share, int(gain.common_rank[point]), units, known=known_together(space))
+
+
+def known_together(space: Space) -> float:
+    """Degrees of freedom of φ: quantiles have about 0.4 of the information of the mean square of as many values."""
+    return 0.4 * max(space.covariance.axes * space.covariance.there.shape[1] - space.local_rank // len(space.q), 5)
+
+
+def scatter_beside(richer: Model, term: Term) -> float:
+    """Variance of what all units share in a model with a term, at least 1, that the common part of the term must exceed."""
+    if of_station(term):
+        return scatter_of_poses(richer)
+    alone = term.shared or not several(richer)
+    return 1.0 if alone else together(richer.space, richer.space.residual)
+
+
+def common_fit(space: Space, candidate: Candidate, point: int) -> Array:
+    """Whitened series (blocks, n) of a candidate at a point of its grid, with coefficients by axis that all units share."""
+    axes = space.covariance.axes
+    columns = space.project(space.whiten(candidate.of_blocks[:, :, point, :]))
+    by_axis = columns.reshape(-1, axes, *columns.shape[1:]).transpose(1, 0, 2, 3).reshape(axes, -1, columns.shape[2])
+    left = space.residual.reshape(-1, axes, columns.shape[1]).transpose(1, 0, 2).reshape(axes, -1, 1)
+    unit = unit_columns(by_axis)[0]
+    across = np.swapaxes(unit, -1, -2)
+    fitted = unit @ (np.linalg.pinv(across @ unit, rcond=SEEN**2, hermitian=True) @ (across @ left))
+    return fitted.reshape(axes, -1, columns.shape[1]).transpose(1, 0, 2).reshape(columns.shape[:2])
 
 
 def shared_factor(model: Model, term: Term) -> float:

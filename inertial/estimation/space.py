@@ -51,11 +51,14 @@ class Gain:
     drop : (grid,), reduction of the whitened sum of squares
     rank : (grid,), number of coefficients that the plan determines
     by_block : (blocks, grid), reduction by block; (0, grid) for coefficients that blocks share
+    common, common_rank : (grid,), the same two with coefficients by axis that all units share
     """
 
     drop: Array
     rank: Places
     by_block: Array
+    common: Array
+    common_rank: Places
 
     @staticmethod
     def joined(parts: Sequence["Gain"]) -> "Gain":
@@ -66,6 +69,8 @@ class Gain:
             np.concatenate([p.drop for p in parts]),
             np.concatenate([p.rank for p in parts]),
             np.concatenate([p.by_block for p in parts], axis=1),
+            np.concatenate([p.common for p in parts]),
+            np.concatenate([p.common_rank for p in parts]),
         )
 
 
@@ -213,7 +218,8 @@ class Space:
         size = np.where(size > 0.0, size, 1.0)
         values, vectors = eigen(found.left / (size[..., :, None] * size[..., None, :]))
         along = np.swapaxes(vectors, -1, -2) @ (found.inside / size[..., None])
-        return self._gain_along(along * inverse_roots(values, SEEN**2)[..., None], values > SEEN**2)
+        common = self._common(found)
+        return self._gain_along(along * inverse_roots(values, SEEN**2)[..., None], values > SEEN**2, common)
 
     def gain_of_dwells(self, columns: Array, dwells: Places) -> Gain:
         """Gain of columns that change a single dwell, for each of some dwells; all blocks share the coefficients.
@@ -241,15 +247,32 @@ class Space:
         size = np.sqrt(np.where(size > 0.0, size, 1.0))
         return self._solved((left / size[:, :, None] / size[:, None, :])[dwells], (inside / size[..., None])[dwells])
 
-    def _gain_along(self, along: Array, seen: Flags) -> Gain:
+    def _common(self, found: Products) -> tuple[Array, Places]:
+        """Reduction (grid,) by coefficients by axis that all units share, and their rank (grid,).
+
+        Columns of the model that blocks share are not estimated again: beside such columns the reduction is a lower limit.
+        """
+        inside = found.inside[..., 0]
+        if found.inside.shape[-1] > 1:
+            inside = inside - found.inside[..., 1:] @ self.shared_sizes
+        left, squares, inside = (
+            each.reshape(-1, self.covariance.axes, *each.shape[1:]).sum(axis=0)
+            for each in (found.left, found.squares, inside)
+        )
+        size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
+        values, vectors = eigen(left / (size[..., :, None] * size[..., None, :]))
+        along = np.einsum("agpr,agp->agr", vectors, inside / size) * inverse_roots(values, SEEN**2)
+        return np.sum(along**2, axis=(0, 2)), (values > SEEN**2).sum(axis=(0, 2))
+
+    def _gain_along(self, along: Array, seen: Flags, common: tuple[Array, Places]) -> Gain:
         """Gain of local columns from their orthonormal directions' products (b, grid, p, t) with the targets."""
         rank = seen.sum(axis=(0, 2))
         if self.targets.shape[-1] == 1:
             by_block = np.einsum("bgr,bgr->bg", along[..., 0], along[..., 0])
-            return Gain(by_block.sum(axis=0), rank, by_block)
+            return Gain(by_block.sum(axis=0), rank, by_block, *common)
         left = self.gram - np.einsum("bgrt,bgrs->gts", along, along)
         drop = np.array([self.rss - schur(each, self.gram) for each in left])
-        return Gain(drop, rank, self._by_block(along, left))
+        return Gain(drop, rank, self._by_block(along, left), *common)
 
     def _by_block(self, along: Array, left: Array) -> Array:
         """Reduction of each block's residual sum of squares, (blocks, grid), with the shared coefficients estimated again.
@@ -288,4 +311,5 @@ class Space:
         seen = values > SEEN**2
         onto = np.einsum("gpr,gp->gr", vectors, along)
         drop = np.sum(np.where(seen, onto**2 / np.where(seen, values, 1.0), 0.0), axis=1)
-        return Gain(drop, seen.sum(axis=1), np.zeros((0, len(left))))
+        rank = seen.sum(axis=1)
+        return Gain(drop, rank, np.zeros((0, len(left))), drop, rank)

@@ -98,7 +98,7 @@ def test_what_a_candidate_takes_off_draws_is_what_least_squares_takes_off(rng: n
     candidate = Candidate(columns, shared=False)
     found = Directions.of(space, candidate)
     drops = found.drops(times_rows(space.backed(draws), candidate))
-    for g, (drop, rank) in enumerate(zip(drops, found.ranks.tolist(), strict=True)):
+    for g, (drop, rank, _) in enumerate(drops):
         expected, seen = np.zeros(7), 0
         white = space.whiten(columns[:, :, g])
         left = space.project(white) / np.linalg.norm(white, axis=1)[:, None]
