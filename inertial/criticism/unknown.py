@@ -132,6 +132,8 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
     if not fits:
         return None
     best, suspect = min(fits, key=lambda pair: pair[0].cost)
+    if best.cost >= base_cost:
+        return None  # the units together show an effect that each of them does not
     if any(fit.cost <= best.cost for fit in fit_curves(base, [s for s in every if s.name in held])):
         return None  # a covariate that the chosen effects already contain fits as well with a free curve
     remaining: list[Term] = []

@@ -77,7 +77,7 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
     plain = restricted_deviance(model.space, model.space)
     dof = max(space.dof, 1)
     deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
-    common, nonlinear = common_part(space, term, model.problem), freedom(term)
+    common, nonlinear = common_part(space, term, model.problem, space.rss - more.rss), freedom(term)
     scatter = scatter_beside(richer, term)
 
     def divided(shared: float) -> Ratio:
@@ -90,17 +90,35 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
 
 @dataclass(frozen=True)
 class Common:
-    """The part of a reduction of the deviance that coefficients by axis common to all units give.
+    """What of a reduction of the deviance is common to all units.
 
-    share : 0 … 1, of the reduction; rank : number of these coefficients; units : number of units with coefficients of their own
-    noise : φ, which divides this part; known : degrees of freedom of φ
+    share : 0 … 1, common part of the reduction by coefficients of the lot
+    drop, own : reductions of the sum of squares by coefficients by axis that all units share, and by what is of each unit
+    rank : number of the coefficients that all units share; units : number of units with coefficients of their own, 1 if none
+    noise : φ, which divides the common part; known : degrees of freedom of φ
     """
 
     share: float = 0.0
+    drop: float = 0.0
+    own: float = 0.0
     rank: int = 0
     units: int = 1
     noise: float = 1.0
     known: float = 1.0
+
+    def parted(self, deviance: float, rank: int) -> tuple[float, float]:
+        """The common part of a deviance with ``rank`` coefficients, not divided by φ, and the part of each unit.
+
+        By chance every coefficient reduces the deviance by one; what is beyond that is divided as the sum of squares is, which
+        falls by more, because the noise of the smaller model includes part of the effect.
+        """
+        chance = min(self.drop, self.rank), min(self.own, rank - self.rank)
+        beyond = self.drop - chance[0], self.own - chance[1]
+        if deviance <= sum(chance) or sum(beyond) <= 0.0:
+            mean = deviance * self.drop / max(self.drop + self.own, 1e-300)
+        else:
+            mean = chance[0] + (deviance - sum(chance)) * beyond[0] / sum(beyond)
+        return mean, deviance - mean
 
 
 def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1, common: Common = Common()) -> Ratio:
@@ -114,16 +132,16 @@ def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1, comm
     ----------
     nonlinear : number of nonlinear parameters; locations : number of locations searched
     """
-    mean, own = deviance * common.share / common.noise, deviance * (1.0 - common.share)
-    coefficients, locations_paid = rank + nonlinear, 2.0 * float(np.log(max(locations, 1)))
+    coefficients, of_locations = rank + nonlinear, 2.0 * float(np.log(max(locations, 1)))
     if common.units == 1 or not 0 < common.rank < rank:
-        deviance = mean + own
-        paid = price(deviance, coefficients) + locations_paid
+        deviance *= 1.0 - common.share * (1.0 - 1.0 / common.noise)
+        paid = price(deviance, coefficients) + of_locations
         return Ratio(deviance, rank, paid, float(log_chi2_tail(deviance, coefficients)))
-    spread = 1.0 + SPREAD**2 * max(deviance * common.share / max(common.rank, 1) - 1.0, 0.0) / common.units
-    paid = price(mean, common.rank + nonlinear) + price(own, rank - common.rank, spread) + locations_paid
-    of_mean = log_f_tail(mean / (common.rank + nonlinear), common.rank + nonlinear, common.known)
-    log_p = min(log_chi2_tail(mean + own, coefficients), of_mean)
+    mean, own = common.parted(deviance, rank)
+    spread = 1.0 + SPREAD**2 * max(mean / common.rank - 1.0, 0.0) / common.units
+    mean, of_mean = mean / common.noise, common.rank + nonlinear
+    paid = price(mean, of_mean) + price(own, rank - common.rank, spread) + of_locations
+    log_p = min(log_chi2_tail(mean + own, coefficients), log_f_tail(mean / of_mean, of_mean, common.known))
     return Ratio(mean + own, rank, paid, float(min(log_p + np.log(2.0), 0.0)))
 
 
@@ -207,22 +225,28 @@ def scatter_of_poses(model: Model) -> float:
     return float(largest)
 
 
-def common_part(space: Space, term: Term, problem: Problem) -> Common:
-    """The part of the reduction by a term, in the space of a model without it, that is common to all units."""
+def common_part(space: Space, term: Term, problem: Problem, total: float = 0.0) -> Common:
+    """The part of the reduction by a term, in the space of a model without it, that is common to all units.
+
+    Parameters
+    ----------
+    total : reduction of the sum of squares by the term with the unknown state before the first dwell, which no units share
+    """
     units = problem.lot.state.time.shape[0]
     if units < 2 or problem.lot.radial:
         return Common()
     if isinstance(term.effect, Handling) and "unit" in term.keywords:
         return Common(1.0 / units)
-    return Common(1.0) if term.shared else common_at(space, space.gain(term.candidate(problem)), 0)
+    return Common(1.0) if term.shared else common_at(space, space.gain(term.candidate(problem)), 0, total)
 
 
-def common_at(space: Space, gain: Gain, point: int) -> Common:
-    """The common part of a gain of coefficients of units, at a point of its grid."""
-    drop, blocks = float(gain.drop[point]), len(gain.by_block)
-    share = min(max(float(gain.common[point]) / drop, 0.0), 1.0) if drop > 0.0 else 0.0
-    units = max(blocks // space.covariance.axes, 1)
-    return Common(share, int(gain.common_rank[point]), units, known=known_together(space))
+def common_at(space: Space, gain: Gain, point: int, total: float = 0.0) -> Common:
+    """The common part of a gain of coefficients of units, at a point of its grid, or of a larger ``total``."""
+    common = max(float(gain.common[point]), 0.0)
+    own = max(float(gain.drop[point]), total) - common
+    units = max(len(gain.by_block) // space.covariance.axes, 1)
+    known = known_together(space)
+    return Common(drop=common, own=max(own, 0.0), rank=int(gain.common_rank[point]), units=units, known=known)
 
 
 def known_together(space: Space) -> float:

@@ -2,6 +2,7 @@
 
 import numpy as np
 from each import each
+from many_units import many_units
 
 from inertial.criticism.diagnosis import diagnose
 from inertial.estimation.lot import Lot
@@ -50,3 +51,23 @@ def test_an_axis_that_rests_in_one_pose_has_its_bias_over_temperature_named(alon
     lot = temperature_test("polynomial", (along,))
     found = diagnose(lot, ("bias", "bias_temperature"), np.random.default_rng(2))
     assert [{"bias_temperature_quadratic"} <= set(named.effects.ids) for named in found.named] == [True]
+
+
+MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
+"""What the units of :func:`many_units` have, and the linear coefficients over the temperature."""
+
+
+@each([("cubic", 0.9, "third_order"), ("quadratic", 0.9, "bias_temperature_quadratic"), ("warm-up", 0.9, "warm_up")])
+def test_an_effect_that_many_units_have_alike_is_named_though_each_of_them_hardly_shows_it(case) -> None:
+    """Charged for a coefficient of every unit and axis, they lost to a drift of the reference and to curves over the time."""
+    common, size, name = case
+    found = diagnose(many_units(80, 41, common, size), MODEL, np.random.default_rng(2))
+    assert found.adequate is False
+    assert [name in named.effects.ids for named in found.named] == [True]
+    assert not found.handled and found.unexplained is None
+
+
+@each([("", 0.0), ("poses", 1.5)])
+def test_noise_and_poses_that_differ_alike_for_all_of_many_units_are_no_effect(case) -> None:
+    found = diagnose(many_units(80, 43, *case), MODEL, np.random.default_rng(2))
+    assert not found.named and not found.handled and found.adequate

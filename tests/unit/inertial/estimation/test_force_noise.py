@@ -1,13 +1,12 @@
 """Noise that grows with the force along the axis is told from equal noise, and from a curve of the transfer function."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
-import pandas as pd
 import pytest
 from long_suites import mostly_slow
 from made_worlds import HIDDEN, NOISES, NULLS, Noise, World, run_of
+from many_units import many_units
 
 from inertial.criticism.examination import ExaminedRun
 from inertial.effects import get_all
@@ -15,8 +14,6 @@ from inertial.estimation.force_noise import by_force
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
-from inertial.frames import force_from_angles
-from pipelines.tables.dwells import lot_of, measured
 
 SEED = 5_700_400
 
@@ -49,21 +46,7 @@ def test_equal_noise_is_not_found_to_grow(name):
 
 def test_equal_noise_of_many_units_is_not_found_to_grow_where_classes_of_force_differ_in_size():
     """12 poses in three soaks: a class of the force along an axis has 6 to 18 dwells, and the mean log of few lies lower."""
-    rng = np.random.default_rng(SEED)
-    turns = np.radians([*product((0, 180), (0,)), *product((90,), (0, 90, 180, 270)), (45, 0), (135, 90), (45, 180)])
-    turns = np.concatenate([turns, np.radians([(135, 270), (60, 45), (120, 225)])])
-    force = np.tile(force_from_angles(*turns.T), (3, 1))
-    celsius = np.repeat([10.0, 25.0, 40.0], 12)
-    time = 20.0 * np.arange(36) + 100.0 * (celsius - 10.0)
-    rows = pd.DataFrame(force, columns=["force_x", "force_y", "force_z"])
-    rows = rows.assign(dwell=range(36), time_s=time, unit_C=celsius, chamber_C=celsius, n=400, duration_s=8.0)
-    units = []
-    for unit in range(128):
-        gain = 1.0 + 5e-3 * rng.standard_normal(3) + 1e-5 * (celsius[:, None] - 25.0)
-        out = gain * (force @ (np.eye(3) + 2e-3 * rng.standard_normal((3, 3)))) + 2e-5 * rng.standard_normal((36, 3))
-        values = {f"out_{a}": out[:, k] for k, a in enumerate("xyz")} | dict.fromkeys(("sd_x", "sd_y", "sd_z"), 4e-4)
-        units.append(rows.assign(unit=f"U{unit}", out_unit="g", **values))
-    lot = lot_of(measured(pd.concat(units, ignore_index=True)))
+    lot = many_units(128, SEED)
     problem = Problem(lot)
     model = Model(problem, terms_of(get_all(("bias", "scale", "misalignment", "scale_temperature")), problem))
     assert by_force(model) is None
