@@ -92,7 +92,8 @@ def changed(name: str, factor: float) -> Generator[None, None, None]:
 
     value = getattr(decisions, name)
     other = {k: v * factor for k, v in value.items()} if isinstance(value, dict) else value * factor
-    held = [m for k, m in sys.modules.items() if k.startswith("inertial.criticism") and getattr(m, name, None) is value]
+    rooms = ("inertial.criticism", "inertial.estimation")
+    held = [m for k, m in sys.modules.items() if k.startswith(rooms) and getattr(m, name, None) is value]
     for module in held:
         setattr(module, name, other)
     try:

@@ -4,15 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
-
 from inertial import decisions
 from inertial.criticism.field import Candidates, Rival
 from inertial.criticism.jumps import Jumps, jumps_in_place_of
 from inertial.criticism.search import judge, judge_refined, ranked, scanned, size_of
 from inertial.decisions import CLASS_WIDTH, CLEAR_LEAD
 from inertial.estimation.alternative import Handling
-from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import price
 from inertial.estimation.term import Term
@@ -112,13 +109,10 @@ def _alike(model: Model, term: Term) -> bool:
     units = model.problem.lot.state.time.shape[0]
     if units < _FEWEST or model.problem.lot.radial or term.shared:
         return False
-    space, candidate = model.at(model.with_term(term).noise), term.candidate(model.problem)
-    by_axis = np.eye(model.problem.per_unit)[np.arange(space.q.shape[0]) % model.problem.per_unit]
-    columns = np.einsum("bngp,ba->bngap", candidate.of_blocks, by_axis)
-    common = space.gain(Candidate(columns.reshape(*columns.shape[:3], -1), shared=True))
-    each = space.gain(candidate)
-    scores = [float(g.drop[0]) - price(float(g.drop[0]), float(g.rank[0])) for g in (common, each)]
-    return scores[0] > scores[1] - CLASS_WIDTH
+    gain = model.at(model.with_term(term).noise).gain(term.candidate(model.problem))
+    both = ((gain.common, gain.common_rank), (gain.drop, gain.rank))
+    common, each = (float(drop[0]) - price(float(drop[0]), float(rank[0])) for drop, rank in both)
+    return common > each - CLASS_WIDTH
 
 
 def _with_jumps(judged: list[Rival], jumps: Jumps) -> list[Rival]:

@@ -91,6 +91,6 @@ def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> fl
         return 0.0
     richer = model.with_term(term)
     common = replace(
-        common_part(space, term, rest.problem), noise=max(shared_noise(richer), scatter_beside(richer, term))
+        common_part(space, term, rest.problem, gain), noise=max(shared_noise(richer), scatter_beside(richer, term))
     )
     return weighed(float(fall(space, gain)[0]), rank, freedom(term), common=common).log_p

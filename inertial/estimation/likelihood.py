@@ -72,12 +72,13 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
     space, more = spaces[best]
     # includes the coefficients of the unknown state of a memory before the first dwell
     rank = more.local_rank + more.shared_rank - space.local_rank - space.shared_rank
-    if rank <= 0 or not space.gain(term.candidate(model.problem)).rank[0]:
+    gain = space.gain(term.candidate(model.problem))
+    if rank <= 0 or not gain.rank[0]:
         return Ratio(0.0, 0, 0.0, 0.0)
     plain = restricted_deviance(model.space, model.space)
     dof = max(space.dof, 1)
     deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
-    common, nonlinear = common_part(space, term, model.problem, space.rss - more.rss), freedom(term)
+    common, nonlinear = common_part(space, term, model.problem, gain, space.rss - more.rss), freedom(term)
     scatter = scatter_beside(richer, term)
 
     def divided(shared: float) -> Ratio:
@@ -225,11 +226,12 @@ def scatter_of_poses(model: Model) -> float:
     return float(largest)
 
 
-def common_part(space: Space, term: Term, problem: Problem, total: float = 0.0) -> Common:
+def common_part(space: Space, term: Term, problem: Problem, gain: Gain, total: float = 0.0) -> Common:
     """The part of the reduction by a term, in the space of a model without it, that is common to all units.
 
     Parameters
     ----------
+    gain : of the term's columns in that space
     total : reduction of the sum of squares by the term with the unknown state before the first dwell, which no units share
     """
     units = problem.lot.state.time.shape[0]
@@ -237,7 +239,7 @@ def common_part(space: Space, term: Term, problem: Problem, total: float = 0.0) 
         return Common()
     if isinstance(term.effect, Handling) and "unit" in term.keywords:
         return Common(1.0 / units)
-    return Common(1.0) if term.shared else common_at(space, space.gain(term.candidate(problem)), 0, total)
+    return Common(1.0) if term.shared else common_at(space, gain, 0, total)
 
 
 def common_at(space: Space, gain: Gain, point: int, total: float = 0.0) -> Common:

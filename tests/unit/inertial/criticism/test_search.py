@@ -1,6 +1,7 @@
 """The forward search: effects that explain more together than jumps of single axes do."""
 
 import numpy as np
+import pytest
 from each import each
 from many_units import many_units
 
@@ -57,17 +58,24 @@ MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature
 """What the units of :func:`many_units` have, and the linear coefficients over the temperature."""
 
 
-@each([("cubic", 0.9, "third_order"), ("quadratic", 0.9, "bias_temperature_quadratic"), ("warm-up", 0.9, "warm_up")])
-def test_an_effect_that_many_units_have_alike_is_named_though_each_of_them_hardly_shows_it(case) -> None:
+@pytest.mark.parametrize(
+    ("common", "name"),
+    [
+        ("quadratic", "bias_temperature_quadratic"),
+        pytest.param("cubic", "third_order", marks=pytest.mark.slow),
+        pytest.param("warm-up", "warm_up", marks=pytest.mark.slow),
+    ],
+)
+def test_an_effect_that_many_units_have_alike_is_named_though_each_of_them_hardly_shows_it(
+    common: str, name: str
+) -> None:
     """Charged for a coefficient of every unit and axis, they lost to a drift of the reference and to curves over the time."""
-    common, size, name = case
-    found = diagnose(many_units(80, 41, common, size), MODEL, np.random.default_rng(2))
-    assert found.adequate is False
-    assert [name in named.effects.ids for named in found.named] == [True]
-    assert not found.handled and found.unexplained is None
+    found = diagnose(many_units(80, 41, common, 0.9), MODEL, np.random.default_rng(2))
+    assert (found.adequate, [name in named.effects.ids for named in found.named]) == (False, [True])
+    assert (found.handled, found.unexplained) == ((), None)
 
 
-@each([("", 0.0), ("poses", 1.5)])
-def test_noise_and_poses_that_differ_alike_for_all_of_many_units_are_no_effect(case) -> None:
-    found = diagnose(many_units(80, 43, *case), MODEL, np.random.default_rng(2))
-    assert not found.named and not found.handled and found.adequate
+@pytest.mark.parametrize("common", ["poses", pytest.param("", marks=pytest.mark.slow)])
+def test_noise_and_poses_that_differ_alike_for_all_of_many_units_are_no_effect(common: str) -> None:
+    found = diagnose(many_units(80, 43, common, 1.5), MODEL, np.random.default_rng(2))
+    assert (found.adequate, found.named, found.handled) == (True, (), ())
