@@ -1,7 +1,7 @@
 """Certifying a run: its units that passed get a validity in the ledger; those that did not are listed with the reason."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Run, files
@@ -147,8 +147,7 @@ def _proposals(
     station = (about.get("station") or {}).get("name", IMPORTED)
     shared: dict[str, Any] = {
         "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
-        "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
-        "evidence": evidence,
+        "recipe": about["recipe"]["name"], "coefficients": "", "reason": reason, "evidence": evidence,
         # the ledger has still to number and stamp the event
         "sequence": 0, "action": "certify", "ends": (), "who": "", "where": "", "when": "", "previous": "",
     }  # fmt: skip
@@ -169,7 +168,8 @@ def _proposals(
         covers: list[str] = list(dict.fromkeys([STATIC, *kinds] if static else kinds))
         verdicts = "; ".join(filter(None, (adequacy, comparisons.verdicts(serial))))
         grade, words = str(row["grade"]), " ".join(covers)
-        proposals.append(LedgerEntry(serial=serial, grade=grade, covers=words, adequacy=verdicts, **shared))
+        event = LedgerEntry(serial=serial, grade=grade, covers=words, adequacy=verdicts, **shared)
+        proposals.append(replace(event, coefficients=run.manifest(event.table)["sha256"]))
     if not (proposals or static) and not any(row["outcome"] != "pass" for row in grades.values()):
         raise WrongUse(f"certify: run {run.id}: {next(iter(result.left_out.values()), NOTHING)}")
     return proposals, result
