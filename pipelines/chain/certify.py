@@ -200,7 +200,10 @@ def _how_to_grade(run: Run) -> str:
         return "it is not finished: give its 'tumbleline run' again and it goes on"
     if axis := run.about.get("plane_across"):
         return f"it was turned about {axis} alone, the scale of {axis} is not known: measure other orientations"
-    if "dwells" not in run.tables() and "procedure_figures" in run.tables():
-        return "a dynamic test was imported: certificates of one need a recipe that measures it ('tumbleline run')"
+    if "dwells" not in (tables := run.tables()) and "procedure_findings" in tables:
+        return (
+            "a dynamic test was imported, and its file states neither the uncertainty of the reference sensor nor limits: "
+            "measure it with 'tumbleline run', by a recipe with limits, on a station whose file has [uncertainty]"
+        )
     again = f"'tumbleline fit {run.id} --limits FILE'"
     return f"it was imported: fit it against limits with {again} and certify the run that this makes"
