@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from inertial.counts import number_of
 from pipelines.archive import Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
@@ -25,7 +26,7 @@ from pipelines.chain.certifiable import (
 )
 from pipelines.stages.figures import plain_reason
 from pipelines.tables.frames import rows_of
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -112,10 +113,16 @@ def certify(  # noqa: PLR0913 - each is an option of the command
             refuse_two_at_once(ledger, run, proposal.serial)
             if not supersede:
                 refuse_meanwhile(ledger, proposal, seen[proposal.serial])
-        for proposal in proposals:
-            event, was_there = ledger.add(proposal, supersede=supersede, amend=meant)
-            (result.there if was_there else result.written).append(event)
-        ledger.anchor([*result.written, *ledger.unanchored(result.there)])
+        try:
+            for proposal in proposals:
+                event, was_there = ledger.add(proposal, supersede=supersede, amend=meant)
+                (result.there if was_there else result.written).append(event)
+            ledger.anchor([*result.written, *ledger.unanchored(result.there)])
+        except ArchiveUnusable as problem:  # a disk that became full
+            count = f"{len(result.events)} of {number_of(len(proposals), 'unit')}"
+            raise ArchiveUnusable(
+                f"{problem}; certify: {count} are in the ledger; give the same command again to go on"
+            ) from None
     return result
 
 
