@@ -44,6 +44,17 @@ def condense(dwells: pd.DataFrame) -> pd.DataFrame:
     return joined[full].dropna(subset=["sd_x", "sd_y", "sd_z"])
 
 
+def reduction(dwells: pd.DataFrame) -> list[str]:
+    """A notice of what :func:`condense` makes of the dwells; none where they are judged as they are."""
+    numbers = np.unique(dwells["dwell"].to_numpy())
+    size = int(np.ceil(len(numbers) / MOST))
+    if size <= 1:
+        return []
+    thinned = _groups(dwells, numbers, size) is None
+    how = f"one in {size} is judged" if thinned else f"{size} neighbours in one pose are averaged to one that is judged"
+    return [f"{len(numbers)} dwells are more than the {MOST} that can be judged at once: {how}"]
+
+
 def _groups(dwells: pd.DataFrame, numbers: NDArray[np.int64], size: int) -> NDArray[np.int64] | None:
     """Number of the group of each dwell; None where poses change too often, or are not known, to average neighbours."""
     columns = [c for c in _REFERENCE if c in dwells.columns]
