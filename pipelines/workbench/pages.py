@@ -4,7 +4,7 @@ import hashlib
 import math
 import secrets
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.resources import files
@@ -30,7 +30,7 @@ from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import BackgroundJob, Jobs
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PageState
-from schemas.errors import TumblelineError, WrongUse
+from schemas.errors import TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.units import MICRO
 
@@ -108,6 +108,16 @@ def workbench_of(request: Request) -> Workbench:
 def asked(request: Request, kind: type[State]) -> tuple[Workbench, State, list[str]]:
     """The workbench of a request, the state of its address, and messages on invalid parts."""
     return workbench_of(request), *kind.parse(request.query_params.multi_items())
+
+
+def not_known(state: PageState, **known: Iterable[str]) -> list[str]:
+    """Messages on values of an address that are none of those that the page knows."""
+    given = {name: (str(getattr(state, name)), list(names)) for name, names in known.items()}
+    return [
+        f"address: {name} = {shown(value, 60)} is not known here ({did_you_mean(value, names)}); it is ignored"
+        for name, (value, names) in given.items()
+        if value and value not in names
+    ]
 
 
 def state_at(body: Mapping[str, Any], kind: type[State]) -> State:
