@@ -28,6 +28,7 @@ from pipelines.stages.figures import plain_reason
 from pipelines.workbench.services import requests
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import BackgroundJob, Jobs
+from pipelines.workbench.services.uploads import in_fields
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PageState
 from schemas.errors import TumblelineError, WrongUse, did_you_mean
@@ -80,7 +81,7 @@ class Workbench:
         try:
             _, content = requests.KINDS[kind][1](self.settings, state)
         except TumblelineError as problem:
-            problems.append(str(problem))
+            problems.append(in_fields(str(problem), kind))
             return None, None
         if kind == "import" and (made := self.jobs.result(kind, content)) and made["run"] not in self.archive.run_ids():
             self.jobs.forget(kind, content)  # its run was removed since

@@ -47,7 +47,7 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
     end, audited = done_in_process("audit", content, lambda *_: None)
     assert end == "done", audited
     end, said = done_in_process("audit", {**content, "station": "nowhere"}, lambda *_: None)
-    assert (end, "--station 'nowhere' has no calibration" in said) == ("failed", True)
+    assert (end, "the field 'Station' 'nowhere' has no calibration" in said) == ("failed", True)
     capability = audited["document"]["population"]["capability"]
     figure, others = capability[0], capability[1:]
     assert others
