@@ -3,7 +3,19 @@
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    SerializerFunctionWrapHandler,
+    ValidationInfo,
+    field_validator,
+    model_serializer,
+)
+
+from schemas.bounds import unquoted
+
+NUMBERS = (int, float, int | None, float | None)
 
 
 def refuse_repeated(values: Iterable[object], where: str, remedy: str) -> None:
@@ -18,6 +30,14 @@ class Strict(BaseModel):
     """A part of a file in which an unknown key is an error, not something to skip."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _unquoted(cls, value: Any, info: ValidationInfo) -> Any:
+        about = cls.model_fields[str(info.field_name)]
+        if any(isinstance(part, BeforeValidator) for part in about.metadata):  # as a time of day, "06:00"
+            return value
+        return unquoted(value, info) if about.annotation in NUMBERS else value
 
 
 class Grown(Strict):
