@@ -3,19 +3,12 @@
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    SerializerFunctionWrapHandler,
-    ValidationInfo,
-    field_validator,
-    model_serializer,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, field_validator, model_serializer
+from pydantic_core.core_schema import SerializerFunctionWrapHandler
 
 from schemas.bounds import unquoted
 
-NUMBERS = (int, float, int | None, float | None)
+NUMBERS: tuple[Any, ...] = (int, float, int | None, float | None)
 
 
 def refuse_repeated(values: Iterable[object], where: str, remedy: str) -> None:
@@ -33,11 +26,10 @@ class Strict(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
-    def _unquoted(cls, value: Any, info: ValidationInfo) -> Any:
-        about = cls.model_fields[str(info.field_name)]
-        if any(isinstance(part, BeforeValidator) for part in about.metadata):  # as a time of day, "06:00"
-            return value
-        return unquoted(value, info) if about.annotation in NUMBERS else value
+    def _unquoted(cls, value: Any, info: Any) -> Any:
+        about = cls.model_fields[info.field_name]
+        reads = BeforeValidator in map(type, about.metadata)  # as a time of day, "06:00"
+        return unquoted(value, info) if about.annotation in NUMBERS and not reads else value
 
 
 class Grown(Strict):
