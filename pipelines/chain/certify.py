@@ -119,10 +119,8 @@ def certify(  # noqa: PLR0913 - each is an option of the command
                 (result.there if was_there else result.written).append(event)
             ledger.anchor([*result.written, *ledger.unanchored(result.there)])
         except ArchiveUnusable as problem:  # a disk that became full
-            count = f"{len(result.events)} of {number_of(len(proposals), 'unit')}"
-            raise ArchiveUnusable(
-                f"{problem}; certify: {count} are in the ledger; give the same command again to go on"
-            ) from None
+            entered = f"{len(result.events)} of {number_of(len(proposals), 'unit')} are in the ledger"
+            raise ArchiveUnusable(f"{problem}; certify: {entered}; give the same command again to go on") from None
     return result
 
 

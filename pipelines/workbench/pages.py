@@ -4,7 +4,7 @@ import hashlib
 import math
 import secrets
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.resources import files
@@ -111,13 +111,12 @@ def asked(request: Request, kind: type[State]) -> tuple[Workbench, State, list[s
     return workbench_of(request), *kind.parse(request.query_params.multi_items())
 
 
-def not_known(state: PageState, **known: Iterable[str]) -> list[str]:
+def not_known(state: PageState, **known: Collection[str]) -> list[str]:
     """Messages on values of an address that are none of those that the page knows."""
-    given = {name: (str(getattr(state, name)), list(names)) for name, names in known.items()}
     return [
         f"address: {name} = {shown(value, 60)} is not known here ({did_you_mean(value, names)}); it is ignored"
-        for name, (value, names) in given.items()
-        if value and value not in names
+        for name, names in known.items()
+        if (value := str(getattr(state, name))) and value not in names
     ]
 
 

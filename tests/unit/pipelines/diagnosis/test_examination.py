@@ -172,7 +172,7 @@ def test_dwells_that_are_too_many_to_be_judged_at_once_are_told(rng, monkeypatch
     told = f"{count} dwells are more than the 40 that can be judged at once: one in {-(-count // 40)} is judged"
     assert told in diagnose(table)["warnings"]
     still = table[[*OUT, "unit", "dwell"]].assign(force_x=1.0)
-    assert "neighbours in one pose are averaged" in condense.reduction(still)[0]
+    assert "neighbours in one pose is judged" in condense.reduction(still)[0]
 
 
 def test_the_step_of_a_lattice_is_found_and_real_numbers_have_none(rng):
