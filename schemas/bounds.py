@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, FiniteFloat
+from pydantic import BeforeValidator, Field, FiniteFloat, ValidationInfo
 
 DAY_S = 86400.0
 LONGEST_WAIT_S = 31 * DAY_S
@@ -24,10 +24,17 @@ LONGEST_TEXT = 10_000
 LARGEST_SEED = 2**63 - 1
 
 
-def _refuse_flag(value: Any) -> Any:
+def unquoted(value: Any, info: ValidationInfo) -> Any:
+    """A value that is no text, which pydantic would take for the number in it; of a command line every value is a text."""
+    if isinstance(value, str) and info.mode == "python":
+        raise ValueError("a text, a number without quotes is needed; correct it")
+    return value
+
+
+def _refuse_flag(value: Any, info: ValidationInfo) -> Any:
     if isinstance(value, bool):
         raise ValueError("true and false are not numbers, a number is needed; give one")  # noqa: TRY004 - pydantic reports a ValueError with its key
-    return value
+    return unquoted(value, info)
 
 
 _NotFlag = BeforeValidator(_refuse_flag)

@@ -64,7 +64,7 @@ def parse_fault(text: str) -> FaultOrder:
             )
         (keys if key in FaultOrder.model_fields and key != "figures" else figures)[key] = value
     try:
-        return FaultOrder.model_validate({**keys, "figures": figures})
+        return FaultOrder.model_validate_strings({**keys, "figures": figures})
     except ValidationError as problem:
         detail = problem.errors(include_url=False)[0]
         where, sentence = ".".join(str(part) for part in detail["loc"] if part != "figures"), reason_of(detail)

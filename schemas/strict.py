@@ -3,7 +3,12 @@
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
+from pydantic import BaseModel, BeforeValidator, ConfigDict, field_validator, model_serializer
+from pydantic_core.core_schema import SerializerFunctionWrapHandler
+
+from schemas.bounds import unquoted
+
+NUMBERS: tuple[Any, ...] = (int, float, int | None, float | None)
 
 
 def refuse_repeated(values: Iterable[object], where: str, remedy: str) -> None:
@@ -18,6 +23,13 @@ class Strict(BaseModel):
     """A part of a file in which an unknown key is an error, not something to skip."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _unquoted(cls, value: Any, info: Any) -> Any:
+        about = cls.model_fields[info.field_name]
+        reads = BeforeValidator in map(type, about.metadata)  # as a time of day, "06:00"
+        return unquoted(value, info) if about.annotation in NUMBERS and not reads else value
 
 
 class Grown(Strict):

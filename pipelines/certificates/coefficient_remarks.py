@@ -9,7 +9,7 @@ from pipelines.archive.run import names_in
 from pipelines.archive.signatures import BAD, GOOD, UNSIGNED, check, public_keys
 from pipelines.archive.store import Place, first_line
 from pipelines.certificates.entries import folder_of
-from pipelines.certificates.ledger import Ledger
+from pipelines.certificates.ledger import Ledger, certified_table
 from pipelines.certificates.validity import Calibration
 from schemas.errors import ArchiveUnusable
 
@@ -100,11 +100,12 @@ def differing_libraries(run: str, manifests: Mapping[str, Mapping[str, Any]]) ->
 
 
 def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
-    """Rows of the unit in the certified table of coefficients of the run."""
+    """Rows of the unit in the certified table of coefficients of the run; none where it certifies other results."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    path = run.path / "coefficients.parquet"
+    name = certified_table(run, calibration.event)
+    path = run.path / f"{name}.parquet"
     try:
         data = path.read_bytes()
         if hashlib.sha256(data).hexdigest() != calibration.event.coefficients:
@@ -119,4 +120,4 @@ def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
             f"calibrations: {path} cannot be read ({first_line(problem)}); restore it from a copy"
         ) from None
     # not table.take, for which pyarrow imports pandas
-    return [row for row in table.to_pylist() if row["unit"] == calibration.serial]
+    return [row for row in table.to_pylist() if name == "coefficients" and row["unit"] == calibration.serial]

@@ -16,7 +16,7 @@ LedgerEntryDocument = TypedDict(
         "grade": str,
         "station": str,
         "recipe": str,
-        "coefficients": Annotated[str, "SHA-256 of the table"],
+        "coefficients": Annotated[str, "SHA-256 of the certified table: coefficients, without any procedure_results"],
         "ends": Annotated[list[int], "sequences of the calibrations that it ended"],
         "who": str,
         "where": str,

@@ -28,7 +28,7 @@ class LedgerEntry:
     sequence : number of the event of the unit, from 1; a calibration has the sequence of the event that began it.
     start, until : validity, first day and the day after the last; a revocation ends validity with ``start``.
     ends : sequences of the calibrations that end with ``start``.
-    coefficients : hash of the table of coefficients.
+    coefficients : hash of the certified table: of the coefficients, of a run without any of ``procedure_results``.
     evidence : hashes of the manifests of the run that support the decision, by table.
     previous : hash of the file of the unit's previous event; empty for the first.
     adequacy : verdict on the run's model with its p, as it was certified; empty in events of earlier versions.
@@ -60,6 +60,11 @@ class LedgerEntry:
     def ends_others_of(self, other: "LedgerEntry") -> bool:
         """Whether it covers any of what another event covers."""
         return bool(set(self.covers.split()) & set(other.covers.split()))
+
+    @property
+    def table(self) -> str:
+        """The table that it certifies."""
+        return "coefficients" if STATIC in self.covers.split() else "procedure_results"
 
     @property
     def certificate(self) -> str:

@@ -144,23 +144,6 @@ class Ledger:
         known = hash_chain.sealed_names(self.root) if events else ()
         return [event for event in events if self._name(event.serial, event.sequence) not in known]
 
-    def write_bulk(self, events: Iterable[LedgerEntry]) -> int:
-        """Write the events of a new archive together, without reading old events or a sync for each file; return their number.
-
-        Parameters
-        ----------
-        events : of a unit in order, numbered from 1; ``previous`` is filled in.
-        """
-        count, last = 0, dict[str, str]()
-        for event in events:
-            data = files.json_bytes(replace(event, previous=last.get(event.serial, "")).document())
-            path = self.root / self._name(event.serial, event.sequence)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-            last[event.serial] = hashlib.sha256(data).hexdigest()
-            count += 1
-        return count
-
     def _append(self, serial: str, decide: Callable[[Sequence[LedgerEntry]], LedgerEntry | None]) -> LedgerEntry | None:
         """Decide on the events of a unit and write the result as its next event; None where nothing is written."""
         folder = self._folder(serial)
@@ -261,11 +244,24 @@ def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
         if not of_run:
             continue
         chosen = out[serial] = next((calibration for calibration in of_run if calibration.state == "valid"), of_run[-1])
-        present = run.manifest("coefficients")["sha256"]
-        if chosen.state != "revoked" and present != chosen.event.coefficients:
-            raise ArchiveUnusable(
-                f"certificate {chosen.certificate} is for other coefficients than those of run {run.id}: their hash is "
-                f"{present[:12]}…, that in the certificate {chosen.event.coefficients[:12]}…; restore the table from a copy, or "
-                f"find the changes with 'tumbleline rerun {run.id} --check' and certify the run again"
-            )
+        if chosen.state != "revoked":
+            refuse_changed(run, chosen)
     return out
+
+
+def refuse_changed(run: Run, calibration: Calibration) -> None:
+    """Refuse a run whose certified table is not the one that a calibration states."""
+    event, table = calibration.event, certified_table(run, calibration.event)
+    present = run.manifest(table)["sha256"]
+    if present != event.coefficients:
+        raise ArchiveUnusable(
+            f"certificate {event.certificate} is for another table {table} than that of run {run.id}: its hash is "
+            f"{present[:12]}…, that in the certificate {event.coefficients[:12]}…; restore the table from a copy, or "
+            f"find the changes with 'tumbleline rerun {run.id} --check' and certify the run again"
+        )
+
+
+def certified_table(run: Run, event: LedgerEntry) -> str:
+    """The table whose hash an event states; earlier versions stated that of the empty coefficients of a dynamic test."""
+    earlier = event.coefficients == run.manifest("coefficients")["sha256"]
+    return "coefficients" if earlier else event.table

@@ -1,9 +1,10 @@
 """Certifying a run: its units that passed get a validity in the ledger; those that did not are listed with the reason."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from inertial.counts import number_of
 from pipelines.archive import Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
@@ -25,7 +26,7 @@ from pipelines.chain.certifiable import (
 )
 from pipelines.stages.figures import plain_reason
 from pipelines.tables.frames import rows_of
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -112,10 +113,14 @@ def certify(  # noqa: PLR0913 - each is an option of the command
             refuse_two_at_once(ledger, run, proposal.serial)
             if not supersede:
                 refuse_meanwhile(ledger, proposal, seen[proposal.serial])
-        for proposal in proposals:
-            event, was_there = ledger.add(proposal, supersede=supersede, amend=meant)
-            (result.there if was_there else result.written).append(event)
-        ledger.anchor([*result.written, *ledger.unanchored(result.there)])
+        try:
+            for proposal in proposals:
+                event, was_there = ledger.add(proposal, supersede=supersede, amend=meant)
+                (result.there if was_there else result.written).append(event)
+            ledger.anchor([*result.written, *ledger.unanchored(result.there)])
+        except ArchiveUnusable as problem:  # a disk that became full
+            entered = f"{len(result.events)} of {number_of(len(proposals), 'unit')} are in the ledger"
+            raise ArchiveUnusable(f"{problem}; certify: {entered}; give the same command again to go on") from None
     return result
 
 
@@ -147,8 +152,7 @@ def _proposals(
     station = (about.get("station") or {}).get("name", IMPORTED)
     shared: dict[str, Any] = {
         "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
-        "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
-        "evidence": evidence,
+        "recipe": about["recipe"]["name"], "coefficients": "", "reason": reason, "evidence": evidence,
         # the ledger has still to number and stamp the event
         "sequence": 0, "action": "certify", "ends": (), "who": "", "where": "", "when": "", "previous": "",
     }  # fmt: skip
@@ -169,7 +173,8 @@ def _proposals(
         covers: list[str] = list(dict.fromkeys([STATIC, *kinds] if static else kinds))
         verdicts = "; ".join(filter(None, (adequacy, comparisons.verdicts(serial))))
         grade, words = str(row["grade"]), " ".join(covers)
-        proposals.append(LedgerEntry(serial=serial, grade=grade, covers=words, adequacy=verdicts, **shared))
+        event = LedgerEntry(serial=serial, grade=grade, covers=words, adequacy=verdicts, **shared)
+        proposals.append(replace(event, coefficients=run.manifest(event.table)["sha256"]))
     if not (proposals or static) and not any(row["outcome"] != "pass" for row in grades.values()):
         raise WrongUse(f"certify: run {run.id}: {next(iter(result.left_out.values()), NOTHING)}")
     return proposals, result
@@ -200,7 +205,10 @@ def _how_to_grade(run: Run) -> str:
         return "it is not finished: give its 'tumbleline run' again and it goes on"
     if axis := run.about.get("plane_across"):
         return f"it was turned about {axis} alone, the scale of {axis} is not known: measure other orientations"
-    if "dwells" not in run.tables() and "procedure_figures" in run.tables():
-        return "a dynamic test was imported: certificates of one need a recipe that measures it ('tumbleline run')"
+    if "dwells" not in (tables := run.tables()) and "procedure_findings" in tables:
+        return (
+            "a dynamic test was imported, and its file states neither the uncertainty of the reference sensor nor limits: "
+            "measure it with 'tumbleline run', by a recipe with limits, on a station whose file has [uncertainty]"
+        )
     again = f"'tumbleline fit {run.id} --limits FILE'"
     return f"it was imported: fit it against limits with {again} and certify the run that this makes"

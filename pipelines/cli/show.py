@@ -171,13 +171,14 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
 def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, with the code, libraries and data that made them."""
     from pipelines.certificates.coefficient_remarks import coefficients_of
+    from pipelines.certificates.ledger import certified_table
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():
         return {"coefficients": None, "made": None}
     print_remarks(run, [valid.serial])
     import_arrow_alone()
-    manifest = run.manifest("coefficients")
+    manifest = run.manifest(certified_table(run, valid.event))
     return {
         "coefficients": coefficients_of(run, valid),
         "made": {key: manifest.get(key) for key in MADE} | {"capture": run.about.get("capture")},
@@ -193,7 +194,7 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
         say(f"  valid    {valid.start} until {valid.until}, grade {event.grade}")
         say(f"  from     run {valid.run}, recipe {event.recipe}, station {event.station}")
         say(f"  by       {event.who} on {event.where}, {event.when}")
-        say(f"  tables   coefficients {event.coefficients[:16]}…")
+        say(f"  tables   {event.table} {event.coefficients[:16]}…")
         if made.get("made"):
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
             say(f"  code     {made['made']['code'][:16]}… with {libraries}")

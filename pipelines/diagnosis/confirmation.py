@@ -232,13 +232,13 @@ def text_of(row: VersionDocument, progress: Confirmation | None) -> str:
     fall = _fall_text(progress)
     if progress["judged_by"] == "fresh run":
         return _text_by_fresh(progress, fall)
-    gain = progress["log_density"]
+    gain, size = progress["log_density"], progress["fall_ug"]
+    least = "falls least" if size is None or size >= 0.0 else "rises most"
+    where = "" if size is None else f" where it {least} of the poses, soaks and stretches of time left out"
     if progress["confirmed"]:
-        return (
-            f"confirmed on stretches of time left out (log likelihood +{gain:.1f}), and the run shows no fault; {fall}"
-        )
+        return f"confirmed on stretches of time left out (log likelihood +{gain:.1f}), and the run shows no fault; {fall}{where}"
     why = progress["reason"] or "no judgement is possible"
-    text = why if fall in why else f"{why}; {fall}"
+    text = why if fall in why else f"{why}; {fall}{where}"
     decides = "a fresh run of the same units decides"
     if gain is not None and gain > LEFT_OUT:
         return (

@@ -19,6 +19,7 @@ from pipelines.diagnosis.documents import BlockingFault, DiagnosisDocument
 from pipelines.diagnosis.next_measurement import Proposed, proposed
 from pipelines.diagnosis.suggested_formula import offer, what_follows
 from pipelines.parallel import keep_memory
+from pipelines.tables.condense import reduction
 from pipelines.tables.dwells import Measured, shows_misalignment, undetermined_responses
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot, told
 from schemas.errors import DataRejected
@@ -249,4 +250,5 @@ def examination(
     with threadpool_limits(1):
         measurement, faults, diagnosis = examined(table, history, effects, left_out)
         content = document(measurement, faults, diagnosis, effects, left_out=left_out)
+        content["warnings"] += reduction(table)
     return Examination(content, measurement, diagnosis)

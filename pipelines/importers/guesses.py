@@ -24,6 +24,7 @@ _SPREAD = re.compile(
     r"^(?:sd|std|sigma|s)[_ .]*(?:acc\w*?|a|out)?[_ .]*([xyz])$|^([xyz])[_ .]*(?:sd|std|sigma)(?:$|[_ .(\[])",
     re.IGNORECASE,
 )
+_SCATTER = r"^(?:sd|std|noise|sigma)"
 _OF_SENSOR = re.compile(r"imu|acc|gyr|gtemp|sensor|die|chip|mpu|unit", re.IGNORECASE)
 _FASTEST_K_S = 2.0
 """Rate of temperature that no chamber reaches."""
@@ -235,7 +236,7 @@ def _single_axis(numeric: dict[str, Array], guessed: dict[str, Guess]) -> bool:
         return False
     guessed[output] = Guess("x", "the one output, which follows its reference")
     guessed[reference] = Guess(meaning, "the reference of the one output")
-    for pattern, further in ((r"^(?:sd|std|noise|sigma)", "sd_x"), (r"^(?:n|samples|count)$", "n")):
+    for pattern, further in ((_SCATTER, "sd_x"), (r"^(?:n|samples|count)$", "n")):
         named = [name for name in numeric if re.match(pattern, name, re.IGNORECASE)]
         guessed |= {name: Guess(further, "its name") for name in named[:1]}
     return True
@@ -252,13 +253,14 @@ def _axes(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]
 def _few_axes(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]) -> dict[str, str]:
     """The columns of a device with one axis or two: all that is left of a record in time; the axis by its name, else in order.
 
-    Where some of them state a unit of an output, the others are none.
+    Where some of them state a unit of an output, the others are none; nor is the scatter of an output.
     """
     if not _column(guessed, "time") or any(_column(guessed, axis) for axis in "xyz"):
         return {}
     left = [name for name, numbers in numeric.items() if not guessed[name].meaning and not _is_index(numbers)]
     left = [name for name in left if triads.may_be_output(name, content.units.get(name, ""))]
     left = [name for name in left if output_unit(content.units.get(name, ""))] or left
+    left = [name for name in left if not re.match(_SCATTER, name, re.IGNORECASE)] or left
     named = [found[1].lower() if (found := _LETTER.search(name)) else "" for name in left]
     letters = named if all(named) and len(set(named)) == len(named) else list("xyz"[: len(left)])
     return dict(sorted(zip(letters, left, strict=True))) if len(left) in (1, 2) else {}

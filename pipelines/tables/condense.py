@@ -18,11 +18,9 @@ def condense(dwells: pd.DataFrame) -> pd.DataFrame:
 
     Averages keep the scatter ``sd_*`` and add the samples ``n``; texts are those of the first dwell.
     """
-    numbers = np.unique(dwells["dwell"].to_numpy())
-    if len(numbers) <= MOST:
+    numbers, size, group = _groups(dwells)
+    if size <= 1:
         return dwells
-    size = int(np.ceil(len(numbers) / MOST))
-    group = _groups(dwells, numbers, size)
     if group is None:
         return dwells[dwells["dwell"].isin(numbers[::size])]
     group_of = pd.Series(group, index=numbers)
@@ -44,16 +42,27 @@ def condense(dwells: pd.DataFrame) -> pd.DataFrame:
     return joined[full].dropna(subset=["sd_x", "sd_y", "sd_z"])
 
 
-def _groups(dwells: pd.DataFrame, numbers: NDArray[np.int64], size: int) -> NDArray[np.int64] | None:
-    """Number of the group of each dwell; None where poses change too often, or are not known, to average neighbours."""
+def reduction(dwells: pd.DataFrame) -> list[str]:
+    """A notice of what :func:`condense` makes of the dwells; none where they are judged as they are."""
+    numbers, size, group = _groups(dwells)
+    if size <= 1:
+        return []
+    judged = f"one in {size}" if group is None else f"the mean of {size} neighbours in one pose"
+    return [f"{len(numbers)} dwells are more than the {MOST} that can be judged at once: {judged} is judged"]
+
+
+def _groups(dwells: pd.DataFrame) -> tuple[NDArray[np.int64], int, NDArray[np.int64] | None]:
+    """Numbers of the dwells, how many make one, and the group of each; None where poses change too often, or are not known."""
+    numbers = np.unique(dwells["dwell"].to_numpy())
+    size = int(np.ceil(len(numbers) / MOST))
     columns = [c for c in _REFERENCE if c in dwells.columns]
-    if not columns:
-        return None
+    if not columns or size <= 1:
+        return numbers, size, None
     first = dwells.drop_duplicates("dwell").sort_values("dwell")
     pose = np.round(first[columns].to_numpy(dtype=float), 4)
     moved = np.concatenate([[True], np.any(np.diff(pose, axis=0) != 0.0, axis=1)])
     if np.count_nonzero(moved) > len(numbers) / (2 * size):
-        return None
+        return numbers, size, None
     start = np.maximum.accumulate(np.where(moved, np.arange(len(numbers)), 0))
     new = moved | ((np.arange(len(numbers)) - start) % size == 0)
-    return np.cumsum(new).astype(np.int64) - 1
+    return numbers, size, np.cumsum(new).astype(np.int64) - 1

@@ -18,6 +18,7 @@ from pipelines.workbench.security import Guard
 from pipelines.workbench.services import lots
 from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.lots import Stale
+from pipelines.workbench.services.uploads import in_fields
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PageState
 from schemas.errors import TumblelineError
@@ -63,7 +64,8 @@ def create_app(settings: WorkbenchSettings, ending: Callable[[], bool] = lambda:
 
 
 def _problem(request: Request, problem: Exception) -> Response:
-    return _answer(request, str(problem), 409 if isinstance(problem, Stale) else 422)
+    text = in_fields(str(problem), request.url.path.rpartition("/")[2])
+    return _answer(request, text, 409 if isinstance(problem, Stale) else 422)
 
 
 def _not_there(request: Request, problem: Exception) -> Response:

@@ -4,7 +4,7 @@ import hashlib
 import math
 import secrets
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.resources import files
@@ -28,9 +28,10 @@ from pipelines.stages.figures import plain_reason
 from pipelines.workbench.services import requests
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import BackgroundJob, Jobs
+from pipelines.workbench.services.uploads import in_fields
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PageState
-from schemas.errors import TumblelineError, WrongUse
+from schemas.errors import TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.units import MICRO
 
@@ -80,7 +81,7 @@ class Workbench:
         try:
             _, content = requests.KINDS[kind][1](self.settings, state)
         except TumblelineError as problem:
-            problems.append(str(problem))
+            problems.append(in_fields(str(problem), kind))
             return None, None
         if kind == "import" and (made := self.jobs.result(kind, content)) and made["run"] not in self.archive.run_ids():
             self.jobs.forget(kind, content)  # its run was removed since
@@ -108,6 +109,15 @@ def workbench_of(request: Request) -> Workbench:
 def asked(request: Request, kind: type[State]) -> tuple[Workbench, State, list[str]]:
     """The workbench of a request, the state of its address, and messages on invalid parts."""
     return workbench_of(request), *kind.parse(request.query_params.multi_items())
+
+
+def not_known(state: PageState, **known: Collection[str]) -> list[str]:
+    """Messages on values of an address that are none of those that the page knows."""
+    return [
+        f"address: {name} = {shown(value, 60)} is not known here ({did_you_mean(value, names)}); it is ignored"
+        for name, names in known.items()
+        if (value := str(getattr(state, name))) and value not in names
+    ]
 
 
 def state_at(body: Mapping[str, Any], kind: type[State]) -> State:

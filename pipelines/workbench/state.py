@@ -5,17 +5,20 @@
 
 import shlex
 from collections.abc import Iterable, Mapping
+from datetime import date
 from typing import Annotated, Any, ClassVar, Literal, Self
 from urllib.parse import urlencode
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from schemas.foreign import shown
 from schemas.toml_files import reason_of
 
 Text = Annotated[str, Field(max_length=200)]
 Texts = Annotated[tuple[Annotated[str, Field(min_length=1, max_length=400)], ...], Field(max_length=60)]
-Day = Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")]
+Day = Annotated[
+    str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$"), AfterValidator(lambda day: day and str(date.fromisoformat(day)))
+]
 Outcome = Literal["", "pass", "fail", "refused"]
 
 ROWS = 50
@@ -57,7 +60,7 @@ class PageState(BaseModel):
         for name, value in query:
             if name in cls.model_fields:
                 several = "tuple" in str(cls.model_fields[name].annotation)
-                values[name] = (*values.get(name, ()), value) if several else value
+                values[name] = tuple(dict.fromkeys((*values.get(name, ()), value))) if several else value
         problems: list[str] = []
         while True:
             try:

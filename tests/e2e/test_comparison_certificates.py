@@ -1,13 +1,16 @@
 """Certificates of results by comparison: sensitivity over frequency, transverse sensitivity and shocks, and what is refused."""
 
+import hashlib
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from in_process import document_of, refused, text_of
 from laboratory import laboratory_file
+from ledger_events import day
 from long_suites import mostly_slow
 
 from pipelines.archive import Archive
@@ -138,16 +141,29 @@ def test_the_printed_form_names_reference_frequency_amplitude_and_band(certified
     assert "Not stated" not in text
 
 
-def test_a_check_against_the_archive_accepts_it_and_a_changed_digit_is_found(certified: tuple[Path, str]) -> None:
-    folder, _ = certified
+def test_a_check_against_the_archive_accepts_it_and_a_changed_digit_or_table_is_found(
+    certified: tuple[Path, str],
+) -> None:
+    folder, run = certified
     words = ("--archive", folder / "archive", "--laboratory", folder / "laboratory.toml")
     assert "accepted" in text_of("verify", folder / "out" / "SF-1_1.xml", *words)
     text = (folder / "out" / "SF-1_1.xml").read_text("utf-8")
+    results = Archive(folder / "archive").run(run).path / "procedure_results"
+    digest = hashlib.sha256(results.with_suffix(".parquet").read_bytes()).hexdigest()
+    assert f"SHA-256 of the table of procedure results: {digest}" in text
     first = re.search(r"magnitude of the sensitivity.*?<si:value>(0\.\d+)</si:value>", text, re.DOTALL)
     assert first is not None
     digit = "1" if first[1][-1] != "1" else "2"
     (folder / "forged.xml").write_text(text.replace(first[1], first[1][:-1] + digit), encoding="utf-8")
     assert "not accepted" in text_of("verify", folder / "forged.xml", *words, status=1)
+    shutil.copytree(folder / "archive", folder / "edited")
+    manifest = folder / "edited" / results.with_suffix(".json").relative_to(folder / "archive")
+    manifest.chmod(0o600)
+    manifest.write_text(manifest.read_text("utf-8").replace(digest, "0" * 64), "utf-8")
+    edited = ("--archive", folder / "edited")
+    other = "certificate SF-1/1 is for another table procedure_results"
+    assert other in text_of("verify", folder / "out" / "SF-1_1.xml", *edited, *words[2:], status=1).replace("\n", " ")
+    assert "not the table of certificate SF-1/1" not in text_of("show", "SF-1", "--at", day(), *words[:2])
 
 
 REFUSED = {

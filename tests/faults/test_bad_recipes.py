@@ -21,6 +21,8 @@ RECIPE = ROOT / "schemas" / "samples" / "production.toml"
         ("soak_min_s = 900.0", "soak_min_s = 9e302", "'soak_min_s': found 9e\\+302"),
         ("dwell_s = 10.0", "dwell_s = 1e200", "'dwell_s': found 1e\\+200"),
         ("dwell_s = 10.0", "dwell_s = true", "true and false are not numbers"),
+        ("dwell_s = 10.0", 'dwell_s = "10"', "'dwell_s': found '10': a text, a number without quotes is needed"),
+        ("seed = 1", 'seed = "1"', "'seed': found '1': a text, a number without quotes is needed"),
         ("dwell_s = 10.0", "dwell_s = -10.0", "'dwell_s': found -10"),
         ("settle_s = 2.0", "settle_s = 1e300", "'settle_s': found 1e\\+300"),
         ("settle_s = 2.0", "settle_s = 1e6", "days, at most 366 are possible"),

@@ -279,7 +279,11 @@ def test_a_run_that_was_copied_here_is_named_with_its_seal_and_without(
     other = run_of(interrupted)
     shutil.copytree(other.path, copy / "runs" / other.id)
     shutil.copytree(other.records.path, copy / "captures" / other.records.path.name)
-    assert found(copy) == [("edited", "sealed.json")]
+    [finding] = verified(copy).checked.findings
+    assert (finding.kind, finding.path) == ("edited", f"runs/{other.id}/sealed.json")
+    assert finding.message.endswith(
+        "run and chain are not from one archive; restore both from one copy, or work in the archive that made the run (--archive)"
+    )
     (copy / "runs" / other.id / "sealed.json").unlink()
     assert found(copy) == [("unchained", "report.json")]
 

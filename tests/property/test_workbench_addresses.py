@@ -17,7 +17,7 @@ CALM = settings(
 )  # the first texts load a table
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
 VALUES = {
-    "texts": st.lists(TEXT.filter(bool), max_size=4).map(tuple),
+    "texts": st.lists(TEXT.filter(bool), max_size=4, unique=True).map(tuple),
     "date": st.sampled_from(["", "2026-11-22", "1999-01-31"]),
 }
 
@@ -72,6 +72,7 @@ def test_a_broken_value_is_left_out_and_said() -> None:
     state, problems = UnitsPage.parse([("search", "a"), ("page", "-3"), ("outcome", "perhaps"), ("strange", "1")])
     assert state == UnitsPage(search="a")
     assert len(problems) == 2
+    assert MissingPage.parse([("added", "third_order")] * 2) == (MissingPage(added=("third_order",)), [])
 
 
 def test_the_command_of_a_diagnosis_names_model_formula_and_dwells_left_out() -> None:

@@ -91,7 +91,7 @@ def _other_entry(facts: CertificateFacts, calibration: Calibration) -> tuple[str
     """Differences of a document from its entry in the ledger, for a document that cannot be generated again."""
     entries = (
         ("run", facts.run, calibration.run),
-        ("SHA-256 of the coefficients", facts.coefficients, calibration.event.coefficients),
+        ("SHA-256 of the certified table", facts.coefficients, calibration.event.coefficients),
         ("date of issue", facts.issued, calibration.event.when[:10]),
     )
     return tuple(

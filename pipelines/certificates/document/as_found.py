@@ -32,6 +32,7 @@ def adjustment(run: Run, calibration: Calibration, known: list[Calibration]) -> 
         for other in known
         if other.event.sequence < calibration.event.sequence
         and other.run != run.id
+        and other.event.table == "coefficients"
         and not (other.state == "revoked" and other.ended_by and other.ended_by.sequence < calibration.event.sequence)
     ]
     if not before:

@@ -20,7 +20,7 @@ from pipelines.certificates.document.content import CertificateContent, letters_
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.numbers import probability, significant
 from pipelines.certificates.entries import STATIC
-from pipelines.certificates.ledger import stated
+from pipelines.certificates.ledger import certified_table, refuse_changed
 from pipelines.certificates.measured import measured_on, measured_span, same_measurement
 from pipelines.certificates.stated_budget import Row, StatedBudget, edge, stated_budget
 from pipelines.procedures import FIGURES as OF_PROCEDURES
@@ -29,7 +29,7 @@ from pipelines.stages.uncertainty.tables import LABELS, has_uncertainty
 from pipelines.tables.calibration import EVERY_AXIS
 from pipelines.tables.frames import rows_of
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance
-from schemas.errors import ArchiveUnusable, WrongUse
+from schemas.errors import WrongUse
 from schemas.units import AXES
 
 QUANTITIES = {
@@ -84,7 +84,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
     WrongUse
         The calibration was revoked, its run states no uncertainty, or an archive of an earlier version lacks what is needed.
     ArchiveUnusable
-        The run's coefficients are not those that were certified.
+        The run's table is not the one that was certified.
     """
     event, about, serial = calibration.event, run.about, calibration.serial
     _refuse(run, calibration)
@@ -138,7 +138,8 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         uncertainty_note=UNCERTAINTY + (FITTED if static else COMPARED),
         declaration=DECLARATION,
         software=f"Tumbleline {(about.get('software') or {}).get('tumbleline', 'version not known')}",
-        coefficients_sha256=event.coefficients,
+        certified_table=certified_table(run, event),
+        certified_sha256=event.coefficients,
     )
 
 
@@ -148,12 +149,7 @@ def _refuse(run: Run, calibration: Calibration) -> None:
             f"certificate {calibration.certificate} of run {run.id} was revoked ({calibration.ended_by.reason}); no document "
             "is made of it; measure the unit again"
         )
-    if run.manifest("coefficients")["sha256"] != calibration.event.coefficients:
-        stated(run, [calibration.serial])  # says which hash is which
-        raise ArchiveUnusable(
-            f"certificate {calibration.certificate}: run {run.id} has other coefficients than were certified; restore the table "
-            "from a copy"
-        )
+    refuse_changed(run, calibration)
 
 
 def _coefficient(row: Row) -> content.Coefficient:

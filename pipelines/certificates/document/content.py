@@ -181,7 +181,7 @@ class CertificateContent(Strict):
     grade_statement : probability that the item exceeds the limit of its grade within the period; empty where it is not known
     adequacy : verdict on the model with its p, as certified; left_out : contributions that U does not contain
     statement_rule : rule of decision; interval : empty unless the customer agreed to have one printed
-    software : release that computed the results; coefficients_sha256 : of the certified table
+    software : release that computed the results; certified_sha256 : of the table ``certified_table``
     """
 
     number: str
@@ -216,4 +216,5 @@ class CertificateContent(Strict):
     uncertainty_note: str
     declaration: str
     software: str
-    coefficients_sha256: str
+    certified_table: str
+    certified_sha256: str

@@ -196,7 +196,7 @@ def statements_of(c: CertificateContent) -> list[str]:
         f"Deviations from the method: {c.who.method.deviations}" if c.who.method.deviations else "",
         c.who.method.remarks,
         c.interval,
-        f"SHA-256 of the table of coefficients: {c.coefficients_sha256}",
+        f"SHA-256 of the table of {c.certified_table.replace('_', ' ')}: {c.certified_sha256}",
     ]
     return [part for part in parts if part]
 

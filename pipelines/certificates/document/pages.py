@@ -96,8 +96,8 @@ def _parts(c: CertificateContent) -> list[dict[str, Any]]:
         _budgets(c),
         _coefficients(c),
         {"title": "Remarks", "before": remarks} if remarks else {},
-        {"title": "Statements", "before": [c.declaration, PREVAILS], "facts": [["SHA-256 of the table of coefficients",
-         c.coefficients_sha256, True]]},
+        {"title": "Statements", "before": [c.declaration, PREVAILS], "facts": [[
+         f"SHA-256 of the table of {c.certified_table.replace('_', ' ')}", c.certified_sha256, True]]},
     ]  # fmt: skip
 
 

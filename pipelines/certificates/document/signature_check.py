@@ -22,7 +22,7 @@ NUMBERS = "{https://ptb.de/si}*"
 MOST_NAMES, LONGEST_NUMBER = 1000, 1000
 SPACES = {"dcc": DCC, "si": SI}
 ISSUED = re.compile(r"^Date of issue: (\d{4}-\d\d-\d\d)$")
-COEFFICIENTS = re.compile(r"^SHA-256 of the table of coefficients: ([0-9a-f]{64})$")
+COEFFICIENTS = re.compile(r"^SHA-256 of the table of (?:coefficients|procedure results): ([0-9a-f]{64})$")
 DEEPEST = 20  # levels of the tree of attachments
 
 

@@ -18,6 +18,7 @@ from pipelines.workbench.pages import (
     asked,
     figure,
     no_figure,
+    not_known,
     page,
     page_part,
     part_of,
@@ -52,6 +53,7 @@ def missing(request: Request) -> Response:
         except TumblelineError as problem:
             problems, work = [*problems, str(problem)], {}
     table = None if diagnosed is None else diagnosed.table
+    problems += not_known(state, unit=table.units, against=table.drivers) if table is not None else []
     return page(
         request, "missing.html", state, problems, sources=chosen, diagnosed=diagnosed, rows=rows,
         worded=None if diagnosed is None else worded(diagnosed.document),

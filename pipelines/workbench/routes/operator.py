@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
 from pipelines.jobs.job import Request as LotRequest
-from pipelines.workbench.pages import RequestBody, asked, figure, no_figure, page, workbench_of
+from pipelines.workbench.pages import RequestBody, asked, figure, no_figure, not_known, page, workbench_of
 from pipelines.workbench.routes.station import chart_of_run, nothing_yet
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.settings import WorkbenchSettings
@@ -94,6 +94,7 @@ def operator(request: Request) -> Response:
     bench, state, problems = asked(request, OperatorPage)
     newest, known = lots.lots(bench.settings), stations_of(bench.settings)
     chosen = next((lot for lot in newest if lot.id == state.lot), None)
+    problems += not_known(state, lot=[lot.id for lot in newest])
     if chosen:  # a lot of a station that this workbench was not started with is shown with the first
         station = next((station for station in known if station.address == chosen.station), known[0])
     else:

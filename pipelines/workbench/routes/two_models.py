@@ -10,7 +10,7 @@ from inertial import effects
 from pipelines.drawing import Chart
 from pipelines.report.diagnosis_pictures import quantity_chart
 from pipelines.report.numbers import significant, with_uncertainty
-from pipelines.workbench.pages import Workbench, asked, figure, no_figure, page, table_csv
+from pipelines.workbench.pages import Workbench, asked, figure, no_figure, not_known, page, table_csv
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.work import Diagnosed
 from pipelines.workbench.state import MissingPage, TwoModelsPage
@@ -42,6 +42,7 @@ def two_models(request: Request) -> Response:
     table = next(
         (diagnosed.table for diagnosed in found if diagnosed is not None and diagnosed.table is not None), None
     )
+    problems += not_known(state, unit=table.units, against=table.drivers) if table is not None else []
     shown = sorted(rows or (), key=lambda row: not np.isfinite(row["change"]))[:MOST]  # what one alone has comes last
     return page(
         request, "two_models.html", state, problems, sides=sides, found=found, waiting=waiting, names=NAMES,

@@ -23,6 +23,7 @@ from pipelines.workbench.pages import (
     asked,
     figure,
     no_figure,
+    not_known,
     page,
     page_part,
     part_of,
@@ -63,12 +64,15 @@ def unit(request: Request) -> Response:
     parameters = list(dict.fromkeys(_parameter(row) for row in history))
     if parameters and state.parameter not in parameters:
         state = state.model_copy(update={"parameter": parameters[0]})
-    state = state.model_copy(update={"against": _against(bench, state) if fitted else ""})
     both = [_table(bench, state, name) for name in ("residuals", "dwells")] if fitted else []
+    drivers = run_pictures.quantities(*both) if both else {}
+    if both and (ignored := not_known(state, against=drivers)):
+        problems, state = [*problems, *ignored], state.model_copy(update={"against": ""})
+    state = state.model_copy(update={"against": _against(bench, state) if fitted else ""})
     index = units.index(state.unit)
     return page(
         request, "unit.html", state, problems, run=run, grade=grade, rows=rows, tables=tables, units=units,
-        drivers=run_pictures.quantities(*both) if both else {},
+        drivers=drivers,
         before=units[index - 1] if index else "", after=units[index + 1] if index + 1 < len(units) else "",
         coefficients=side_by_side(rows.get("coefficients", []), _expanded), parameters=parameters,
         coverage=coverage_of(run.about),

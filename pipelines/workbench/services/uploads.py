@@ -65,19 +65,25 @@ class UploadReading:
     problem: str = ""
 
 
-_FIELD_OF = {
-    "unit-of output": "Unit of the output", "unit-of time": "Unit of time", "unit-of temperature": "Unit of temperature",
-    "map": "Meaning of the columns", "rate": "Rate", "units": "Serial number", "set local_gravity_m_s2": "Local gravity",
-    "set poses": "Faces", "set rows": "One row is", "fit": "Fit",
+_FIELDS_OF: dict[str, dict[str, str]] = {
+    "import": {
+        "unit-of output": "Unit of the output", "unit-of time": "Unit of time", "unit-of temperature": "Unit of temperature",
+        "map": "Meaning of the columns", "rate": "Rate", "units": "Serial number", "set local_gravity_m_s2": "Local gravity",
+        "set poses": "Faces", "set rows": "One row is", "fit": "Fit",
+    },
+    "audit": {"since": "From", "until": "Until", "device": "Device", "station": "Station"},
+    "discover": {"device": "Device"},
+    "release": {"reason": "Reason"},
 }  # fmt: skip
-"""The fields of the page in place of options of the command ``import``."""
-_OPTION = re.compile(rf"--({'|'.join(_FIELD_OF)})\b(?:=(?!…)([^\s;,]+)|=…| HZ| SN| [a-z_]+=[^\s;,]*)?")
+"""By the kind of work, the fields of its page in place of options of its command."""
 
 
-def in_fields(text: str) -> str:
-    """A message on an import with the fields of the page in place of options; what the page lacks is of the command line."""
-    text = _OPTION.sub(lambda m: f"the field '{_FIELD_OF[m[1]]}'" + (f" ({m[2]})" if m[2] else ""), text)
-    lacking = "; what begins with -- is an option of 'tumbleline import'"
+def in_fields(text: str, kind: str = "import") -> str:
+    """A message on work of a page with its fields in place of options; what the page lacks is of the command line."""
+    fields = _FIELDS_OF.get(kind, {})
+    option = rf"--({'|'.join(fields) or '(?!)'})\b(?:=(?!…)([^\s;,]+)|=…| HZ| SN| TEXT| [a-z_]+=[^\s;,]*)?"
+    text = re.sub(option, lambda m: f"the field '{fields[m[1]]}'" + (f" ({m[2]})" if m[2] else ""), text)
+    lacking = "; what begins with -- is an option of the command line"
     return text + (lacking if " --" in text and "tumbleline" not in text else "")
 
 

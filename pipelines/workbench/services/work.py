@@ -52,7 +52,9 @@ def done_in_process(kind: str, request: Mapping[str, Any], report_progress: Repo
         with threadpool_limits(1), effects.additions_forgotten():
             return "done", WORK[kind](request, report_progress)
     except (TumblelineError, InertialError) as problem:
-        return "failed", str(problem)
+        from pipelines.workbench.services.uploads import in_fields
+
+        return "failed", in_fields(str(problem), kind)
     except BrokenPipeError:  # the server ended: nobody waits for the result
         raise
     except Exception as problem:  # noqa: BLE001 - a defect: the page says so, the details go to the server's log
@@ -291,13 +293,10 @@ def address_of(finding: AuditFinding) -> str:
 def bring_in(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """The import of an uploaded file."""
     report_progress(0, 2, "reading the file")
-    from pipelines.workbench.services.uploads import imported, in_fields
+    from pipelines.workbench.services.uploads import imported
 
     report_progress(1, 2, "importing")
-    try:
-        return imported(request)
-    except TumblelineError as problem:
-        raise type(problem)(in_fields(str(problem))) from None
+    return imported(request)
 
 
 WORK: dict[str, Any] = {

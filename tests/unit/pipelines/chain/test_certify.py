@@ -1,5 +1,6 @@
 """What is certified, for how long, by whom, and once: the run is named, its dates are allowed, its files are sound and signed."""
 
+import errno
 import json
 import re
 from collections.abc import Callable
@@ -62,6 +63,26 @@ def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatc
     done = typed("certificate", "issue", "--json")
     assert f"certificate issue: run {run.id}, measured on {end_of(run)}" in done.stderr
     assert json.loads(done.stdout)["run"] == run.id
+
+
+def test_a_disk_that_becomes_full_leaves_units_out_that_the_same_command_adds(
+    run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, room = files._write_durably, iter(range(2))
+
+    def written(path: Path, data: bytes) -> None:
+        if "calibrations" in path.parts and next(room, None) is None:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        write(path, data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "_write_durably", written)
+        told = str(typed("certificate", "issue", "--reason", "first").exception)
+    assert "No space left" in told
+    assert told.endswith("certify: 2 of 3 units are in the ledger; give the same command again to go on")
+    done = json.loads(typed("certificate", "issue", "--reason", "first", "--json").stdout)["certified"]
+    assert {(one["certificate"], one["was_there"]) for one in done} == {("A1/1", True), ("A2/1", True), ("A3/1", False)}
+    assert not Ledger(run.archive).unanchored([one.event for one in Ledger(run.archive).all()])
 
 
 def test_a_certificate_begins_at_the_measurement_or_later_and_lasts_no_longer_than_is_allowed(

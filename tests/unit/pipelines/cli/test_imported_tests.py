@@ -181,12 +181,14 @@ def test_a_delay_beside_a_filter_that_may_be_absent_is_never_longer_than_both(tm
     document = document_of(*sweep(tmp_path, OWN, form="u", scatter=0.15), status=0)
     delay, run = document["parameters"]["delay_s"], Archive(tmp_path / "archive").run(document["run"])
     assert len(run.table("procedure_points")) == 45
-    told = refused("diagnose", run.id, "--archive", str(tmp_path / "archive"))
+    archive = ("--archive", str(tmp_path / "archive"))
+    told = refused("diagnose", run.id, *archive)
     assert f"'tumbleline show {run.id} procedure_points'" in told
     assert "tumbleline fit" not in told
-    assert "it has procedure_findings, procedure_points" in refused(
-        "show", run.id, "dwells", *("--archive", str(tmp_path / "archive"))
+    assert "neither the uncertainty of the reference sensor nor limits" in refused(
+        "certificate", "issue", run.id, *archive
     )
+    assert "it has procedure_findings, procedure_points" in refused("show", run.id, "dwells", *archive)
     assert run.about["source"]["sha256"]
     assert 0.0 < delay["low"] < 35e-6  # a filter of some kHz may make a part of it
     assert delay["high"] < 42e-6

@@ -9,6 +9,7 @@ from long_suites import mostly_slow
 from inertial.data_errors.faults.quantised import lattice_step
 from pipelines.diagnosis.diagnose import diagnose, examination
 from pipelines.diagnosis.sections import fault_lines
+from pipelines.tables import condense
 
 pytestmark = pytest.mark.usefixtures("no_next_measurement")
 
@@ -162,6 +163,16 @@ def test_a_clipped_output_is_physics_and_no_fault(rng):
         rng, plan="six", temperatures=(0, 25, 50, 25), hidden=lambda f, t, s, r: np.clip(f, -0.97, 0.97) - f
     )
     assert diagnose(table)["blocked_by"] == []
+
+
+def test_dwells_that_are_too_many_to_be_judged_at_once_are_told(rng, monkeypatch):
+    monkeypatch.setattr(condense, "MOST", 40)
+    table = lots.lot(rng, units=1, temperatures=(25.0,) * 3)
+    count = len(table)
+    told = f"{count} dwells are more than the 40 that can be judged at once: one in {-(-count // 40)} is judged"
+    assert told in diagnose(table)["warnings"]
+    still = table[[*OUT, "unit", "dwell"]].assign(force_x=1.0)
+    assert "neighbours in one pose is judged" in condense.reduction(still)[0]
 
 
 def test_the_step_of_a_lattice_is_found_and_real_numbers_have_none(rng):

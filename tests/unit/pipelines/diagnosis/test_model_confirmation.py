@@ -56,6 +56,9 @@ def test_a_gain_in_density_confirms_neither_an_error_that_rises_nor_a_fall_withi
     assert "rises from" in text_of(ROW, worse)
     better = confirmation._by_left_out(missed(1e-4, 100.0), missed(0.5e-4, 150.0))
     assert (better["confirmed"], better["rises"]) == (True, None)
+    assert text_of(ROW, better).endswith(
+        " (k = 2) µg where it falls least of the poses, soaks and stretches of time left out"
+    )
     before = missed(1e-4, 100.0)
     once = before.missed["blocks of time"].copy()
     once[:, :5] *= 0.5  # one stretch of six has the whole fall

@@ -192,6 +192,7 @@ def test_a_sheet_of_positions_is_proposed_as_dwells_and_unknown_axes_stand_in_ca
     [
         (("a",), "x=a --unit-of output=UNIT,time=s --units S --set axes=x"),
         (("acc_x", "acc_z"), "x=acc_x,z=acc_z --unit-of output=UNIT,time=s --units S --set axes=x,z"),
+        (("U_V", "sd_V"), "x=U_V --unit-of output=V,time=s --units S --set axes=x"),
         (("temp", "az"), "temperature=temp,z=az --unit-of output=UNIT,time=s --units S --set axes=z"),
     ],
 )

@@ -47,7 +47,7 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
     end, audited = done_in_process("audit", content, lambda *_: None)
     assert end == "done", audited
     end, said = done_in_process("audit", {**content, "station": "nowhere"}, lambda *_: None)
-    assert (end, "--station 'nowhere' has no calibration" in said) == ("failed", True)
+    assert (end, "the field 'Station' 'nowhere' has no calibration" in said) == ("failed", True)
     capability = audited["document"]["population"]["capability"]
     figure, others = capability[0], capability[1:]
     assert others
@@ -132,6 +132,12 @@ def test_a_unit_has_figures_and_coefficients_with_u_once_and_residuals_against_w
     chart = client.get(f"/unit/figure/residuals.json?run={run.id}&unit=A1&against=time").json()
     assert sum("error_y" in trace for trace in chart["data"]) == 3
     assert f"tumbleline show {run.id} residuals --archive" in page
+    for told, address in {
+        "against = banana": f"/unit?run={run.id}&unit=A1&against=banana",
+        "lot = none": "/operator?lot=none",
+        "since = 2026-02-31": "/units?since=2026-02-31",
+    }.items():
+        assert client.get(address).text.count(f"address: {told} ") == 1
     for path in (run.path / "grades.json", run.path / "grades.parquet", run.report):  # as a fit without limits
         path.unlink(missing_ok=True)
     ungraded = client.get(f"/unit?run={run.id}&unit=A1").text
@@ -170,6 +176,10 @@ def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_
         end, results[key_of(kind, content)] = done_in_process(kind, content, lambda *_: None)
         assert end == "done", results
     text = client.get(state.address()).text
+    sides = requests.two_models(settings, state)
+    for page in (state.address(unit="XX", against="banana"), sides[0].address(unit="XX", against="banana")):
+        told = client.get(page).text
+        assert [told.count(f"address: {part} ") for part in ("unit = XX", "against = banana")] == [1, 1]
     cells = re.findall(r'<td class="n">([^<]*)</td>', text)
     first, second = (results[key_of(kind, content)].document["error"] for kind, content in works[:2])
     assert first["rms_ug"] > 3.0 * second["rms_ug"]

@@ -274,8 +274,12 @@ def test_files_of_the_folder_alone_are_sources_and_an_upload_stays_in_it_whateve
     told = "give --unit-of output=g, or --unit-of time=…; --rate HZ, --set gaps=split"
     assert uploads.in_fields(told) == (
         "give the field 'Unit of the output' (g), or the field 'Unit of time'; the field 'Rate', --set gaps=split; what begins "
-        "with -- is an option of 'tumbleline import'"
+        "with -- is an option of the command line"
     )
+    told = "audit: --since 2026-02-01 is after --until 2026-01-01, a period is needed"
+    assert "the field 'From' 2026-02-01 is after the field 'Until' 2026" in uploads.in_fields(told, "audit")
+    told = "release: no reason is given, one is needed; give --reason TEXT"
+    assert uploads.in_fields(told, "release").endswith("one is needed; give the field 'Reason'")
 
 
 def test_a_run_that_was_added_is_in_the_next_answer_and_an_unchanged_archive_is_not_looked_at_again(

@@ -248,6 +248,8 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
     second.seal()
     certify(Ledger(first.archive), second, ["A1"], supersede=True)
     known = Ledger(first.archive).calibrations("A1")
+    swept = replace(known[0], event=replace(known[0].event, run="sweep", covers="sweep"))  # it has no coefficients
+    known.insert(1, swept)
     c = compose(second, known[-1], known, LaboratoryFile.model_validate(tomllib.loads(LABORATORY)))
     assert c.adjustment.earlier == "A1/1"
     assert c.adjustment.dwells == 2
