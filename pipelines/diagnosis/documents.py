@@ -301,27 +301,32 @@ class ComparisonDocument(TypedDict):
     progress: Annotated[Confirmation | None, "null without a version to compare with"]
 
 
-class VersionDocument(TypedDict):
-    """A version of a model; its errors are null without `--dwells`."""
+class JudgedVersion(TypedDict):
+    """The errors of one version of a model, and the verdict on its change."""
 
     version: int
     added: list[str]
-    removed: list[str]
-    effects: list[str]
-    by: str
-    at: Annotated[str, "ISO date and time; empty if the file does not have it"]
-    why: str
-    run: str
     fitted_ug: Annotated[float | None, "residual of the fit, µg"]
     heldout_ug: Annotated[float | None, "worst cross-validated error of poses, soaks and blocks of time, µg"]
-    fresh_ug: Annotated[float | None, "error on the fresh run, µg"]
-    floor_ug: Annotated[float | None, "noise floor, µg"]
+    fresh_ug: Annotated[float | None, "error on the fresh run, µg; null without `--fresh`"]
     fall_ug: Annotated[float | None, "decrease of the error by what was added, µg"]
     fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
     confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
     reason: Annotated[str | None, "why it is not decided; null: it is, or nothing is judged"]
     text: Annotated[str, "`confirmed` as a sentence"]
     warnings: list[str]
+
+
+class VersionDocument(JudgedVersion):
+    """A version of a model; its errors are null without `--dwells`."""
+
+    removed: list[str]
+    effects: list[str]
+    by: str
+    at: Annotated[str, "ISO date and time; empty if the file does not have it"]
+    why: str
+    run: str
+    floor_ug: Annotated[float | None, "noise floor, µg"]
 
 
 class HistoryDocument(TypedDict):

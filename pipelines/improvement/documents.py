@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from pipelines.diagnosis.documents import DiagnosisDocument
+from pipelines.diagnosis.documents import DiagnosisDocument, JudgedVersion
 
 
 class ImprovementChoice(TypedDict):
@@ -18,21 +18,10 @@ class ImprovementChoice(TypedDict):
     added: bool
 
 
-class LadderRow(TypedDict):
+class LadderRow(JudgedVersion):
     """The errors of one version of the model."""
 
-    version: int
-    added: list[str]
-    fitted_ug: Annotated[float | None, "residual of the fit, µg"]
-    heldout_ug: Annotated[float | None, "worst cross-validated error of poses, soaks and blocks of time, µg"]
-    fresh_ug: Annotated[float | None, "error on the fresh run, µg; null without `--fresh`"]
     noise_ug: Annotated[float, "noise of the measurement by the last diagnosis, µg"]
-    fall_ug: Annotated[float | None, "decrease of the error by what was added, µg"]
-    fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
-    confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
-    reason: Annotated[str | None, "why it is not decided; null: it is, or nothing is judged"]
-    text: Annotated[str, "`confirmed` as a sentence"]
-    warnings: list[str]
 
 
 class RecordingDocument(TypedDict):

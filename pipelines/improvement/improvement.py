@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast, get_type_hints
 
-from pipelines.diagnosis.documents import ComparisonDocument, DiagnosisDocument, VersionDocument
+from pipelines.diagnosis.documents import ComparisonDocument, DiagnosisDocument, JudgedVersion, VersionDocument
 from pipelines.improvement.documents import ImproveDocument, ImprovementChoice, LadderRow
 from schemas.errors import WrongUse, did_you_mean
 
@@ -230,20 +230,8 @@ class Improvement:
         if noise is None:
             return []
         rows = errors_by_version(versions, given, lambda: self.attendant.working("fitting"))
+        names = get_type_hints(JudgedVersion)
         return [
-            {
-                "version": row["version"],
-                "added": row["added"],
-                "fitted_ug": row["fitted_ug"],
-                "heldout_ug": row["heldout_ug"],
-                "fresh_ug": row["fresh_ug"],
-                "noise_ug": noise,
-                "fall_ug": row["fall_ug"],
-                "fall_u_ug": row["fall_u_ug"],
-                "confirmed": row["confirmed"],
-                "reason": row["reason"],
-                "text": row["text"],
-                "warnings": row["warnings"],
-            }
+            cast("LadderRow", {name: value for name, value in row.items() if name in names} | {"noise_ug": noise})
             for row in rows
         ]

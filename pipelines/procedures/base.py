@@ -17,6 +17,8 @@ from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.recipe import Recipe, Strict
 from schemas.station import StationConfig
 
+Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
+
 
 class Part(Strict):
     """The part of a recipe that belongs to one procedure: a table ``[[procedures]]``; ``kind`` names the procedure."""
@@ -24,7 +26,13 @@ class Part(Strict):
     kind: Any  # each procedure narrows it to its own name
 
 
-class NominalScale(Part):
+class AtTemperature(Part):
+    """A part whose records are taken at one temperature of the chamber."""
+
+    temperature_C: Celsius = 25.0
+
+
+class NominalScale(AtTemperature):
     """A part of a procedure whose figures are in g: the scale comes from the multi-position test, or is stated.
 
     ``scale`` is the nominal scale, output per g, for lists without a multi-position test before the procedure.

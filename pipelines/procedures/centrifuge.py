@@ -67,7 +67,6 @@ class CentrifugePart(NominalScale):
     point_ppm: NotNegative = 2.0
     record_s: Annotated[Positive, Field(le=600.0)] = 5.0
     full_scale_g: Positive = 30.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     effects: Annotated[list[str], Field(max_length=6)] = Field(default_factory=lambda: list(DEFAULT))
 
     @model_validator(mode="after")
