@@ -10,8 +10,9 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial
-from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagnose_spins
+from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinFit, diagnose_spins
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
+from inertial.dynamics.missing_effects import DiagnosisInG
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import InG, NominalScale, OnEquipment, RecordByRecord, refuse_unknown_effects, scale_of
@@ -261,7 +262,7 @@ def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
 
 
-def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
+def judged(part: CentrifugePart, rows: pd.DataFrame) -> DiagnosisInG[SpinFit]:
     """The diagnosis of the part's model on the points of one unit."""
     force, value, error = numbers(rows)
     radius = rows["radius_m"].to_numpy(dtype=float) if part.radii_m else np.full(force.size, part.radius_m)
