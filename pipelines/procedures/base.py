@@ -47,11 +47,12 @@ class Procedure(ABC):
     A subclass lists its steps. What else it can do is stated by the classes below that it inherits, each with abstract methods:
     :class:`Evaluated`, :class:`InG`, :class:`OnEquipment`, :class:`SetsEquipment`, :class:`FromWaveforms`, :class:`Compares`.
 
-    name : of the module, and ``kind`` in recipes · title : heading in the report · order : procedures are listed by it
+    Its name is the module's, and ``kind`` in recipes.
+
+    title : heading in the report · order : procedures are listed by it
     roles : equipment that a station must have · source : standard, edition and part · states : its results in one line
     """
 
-    name: ClassVar[str]
     title: ClassVar[str]
     order: ClassVar[int]
     states: ClassVar[str]

@@ -31,7 +31,6 @@ class BiasStabilityPart(NominalScale):
 class BiasStability(InG, RecordByRecord):
     """A bias record of an hour."""
 
-    name = "bias_stability"
     title = "Bias stability"
     order = 40
     states = "standard deviation of 100 s means, drift per hour, Allan deviation at 100 s, and the other definitions"

@@ -108,7 +108,6 @@ class CentrifugePart(NominalScale):
 class CentrifugeTest(InG, OnEquipment, RecordByRecord):
     """Constant speeds on a centrifuge."""
 
-    name = "centrifuge"
     title = "Centrifuge"
     order = 130
     states = (

@@ -51,7 +51,6 @@ PLAIN = "the profile sets nothing but the temperature, of which the change is no
 class Exposure(InG, OnEquipment, RecordByRecord):
     """A profile of the environment between two measurements in six poses."""
 
-    name = "exposure"
     title = "Exposure to an environment"
     order = 65
     states = (

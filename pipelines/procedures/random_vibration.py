@@ -89,7 +89,6 @@ class RandomVibrationPart(NominalScale):
 class RandomVibration(InG, OnEquipment, Compares):
     """Gaussian vibration by a profile."""
 
-    name = "random_vibration"
     title = "Random vibration"
     order = 115
     states = "rectification over g rms²; transfer function H1 with coherence and its model; density against tolerance"

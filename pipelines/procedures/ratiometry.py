@@ -62,7 +62,6 @@ class RatiometryPart(AtTemperature):
 class Ratiometry(SetsEquipment, RecordByRecord):
     """Zero and sensitivity at several supply voltages."""
 
-    name = "ratiometry"
     title = "Supply voltage"
     order = 70
     states = "zero and sensitivity over the supply voltage: ratiometric error, or rejection of the supply"

@@ -42,7 +42,6 @@ SCATTER_DEG = 0.1  # largest scatter of the encoder's readings: then 300 of them
 class Rotation(InG, Evaluated):
     """Planes of the device turned through gravity at steady rates, both ways."""
 
-    name = "rotation"
     title = "Constant-rate rotation"
     order = 32
     states = (

@@ -82,7 +82,6 @@ class ShockPart(NominalScale):
 class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
     """Half-sine shocks with the bias before and after."""
 
-    name = "shock"
     title = "Half-sine shock"
     order = 120
     states = "sensitivity by comparison, pulse, undershoot, return, zero and bias shift, survival; spectrum of reference and unit"

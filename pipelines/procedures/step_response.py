@@ -54,7 +54,6 @@ class StepPart(AtTemperature):
 class StepResponse(OnEquipment, FromWaveforms):
     """Steps of force by the self-test of the devices."""
 
-    name = "step_response"
     title = "Step response"
     order = 116
     states = "settling time into a band, overshoot, rise time, of the worst axis"

@@ -59,7 +59,6 @@ class SupplyRipplePart(NominalScale):
 class SupplyRipple(SetsEquipment, InG, RecordByRecord):
     """A sine on the supply of devices at rest."""
 
-    name = "supply_ripple"
     title = "Supply ripple"
     order = 71
     states = "rejection of ripple on the supply over its frequency"

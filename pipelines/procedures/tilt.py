@@ -47,7 +47,6 @@ class TiltPart(AtTemperature):
 class Tilt(RecordByRecord):
     """The output of the axes that lie in one plane, over a whole turn."""
 
-    name = "tilt"
     title = "Single-axis tilt"
     order = 30
     states = "bias, scale, angle of the input axis, K2 and K3 within 1 g, of the axes that lie in the plane"

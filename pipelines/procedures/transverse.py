@@ -61,7 +61,6 @@ class TransversePart(NominalScale):
 class TransverseTest(InG, OnEquipment, Compares):
     """The output of the sensitive axis under motion across it, over the angle of the unit about that axis."""
 
-    name = "transverse"
     title = "Transverse sensitivity"
     order = 114
     states = "largest transverse sensitivity in % of the sensitivity, and its direction"

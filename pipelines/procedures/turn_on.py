@@ -32,7 +32,6 @@ class TurnOnPart(NominalScale):
 class TurnOn(InG, RecordByRecord):
     """Power cycles in one pose."""
 
-    name = "turn_on"
     title = "Turn-on to turn-on repeatability"
     order = 60
     states = "standard deviation of the bias between power cycles, the cycles' own error removed"

@@ -34,7 +34,6 @@ class WarmUpPart(NominalScale):
 class WarmUp(InG, RecordByRecord):
     """A record from power-on."""
 
-    name = "warm_up"
     title = "Warm-up time"
     order = 50
     states = "time from power-on until the smoothed output stays within its band"
