@@ -144,23 +144,6 @@ class Ledger:
         known = hash_chain.sealed_names(self.root) if events else ()
         return [event for event in events if self._name(event.serial, event.sequence) not in known]
 
-    def write_bulk(self, events: Iterable[LedgerEntry]) -> int:
-        """Write the events of a new archive together, without reading old events or a sync for each file; return their number.
-
-        Parameters
-        ----------
-        events : of a unit in order, numbered from 1; ``previous`` is filled in.
-        """
-        count, last = 0, dict[str, str]()
-        for event in events:
-            data = files.json_bytes(replace(event, previous=last.get(event.serial, "")).document())
-            path = self.root / self._name(event.serial, event.sequence)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-            last[event.serial] = hashlib.sha256(data).hexdigest()
-            count += 1
-        return count
-
     def _append(self, serial: str, decide: Callable[[Sequence[LedgerEntry]], LedgerEntry | None]) -> LedgerEntry | None:
         """Decide on the events of a unit and write the result as its next event; None where nothing is written."""
         folder = self._folder(serial)

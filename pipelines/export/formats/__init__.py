@@ -65,8 +65,3 @@ def export_files(
                 )
             files[name_of_file] = data if isinstance(data, bytes) else data.encode()
     return files
-
-
-def export_text(name: str, units: Sequence[UnitCalibration], run: str, settings: ExportSettings | None = None) -> str:
-    """The calibrations in a format of text, the files of several units one after another; see :func:`export_files`."""
-    return b"".join(export_files(name, units, run, settings).values()).decode()
