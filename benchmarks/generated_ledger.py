@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipelines.archive import Archive, files
-from pipelines.archive.store import Place
 from pipelines.certificates.days import months_after
 from pipelines.certificates.entries import LedgerEntry, folder_of
 
@@ -25,11 +24,11 @@ def write_ledger(folder: Path, calibrations: Iterable[tuple[str, str, str, str, 
     known = list(calibrations)
     runs = Archive(folder).root / "runs"
     hashes = {run: files.read_json(runs / run / "coefficients.json")["sha256"] for run in {one[2] for one in known}}
-    return write_bulk(Archive(folder).root, _events(known, hashes))
+    return write_events(folder, _events(known, hashes))
 
 
-def write_bulk(root: Place, events: Iterable[LedgerEntry]) -> int:
-    """Writes the events of a new archive, without reading old events or a sync for each file; their number.
+def write_events(folder: Path, events: Iterable[LedgerEntry]) -> int:
+    """Write the events of an archive together, without reading old events or a sync for each file; return their number.
 
     Parameters
     ----------
@@ -38,7 +37,7 @@ def write_bulk(root: Place, events: Iterable[LedgerEntry]) -> int:
     count, last = 0, dict[str, str]()
     for event in events:
         data = files.json_bytes(replace(event, previous=last.get(event.serial, "")).document())
-        path = root / folder_of(event.serial) / f"{event.sequence:06d}.json"
+        path = Archive(folder).root / folder_of(event.serial) / f"{event.sequence:06d}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
         last[event.serial] = hashlib.sha256(data).hexdigest()

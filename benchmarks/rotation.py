@@ -21,7 +21,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from benchmarks.slow_noise import kept, mean_of
-from inertial.dynamics.rotation_diagnosis import RotationDiagnosis, diagnose_rotation
+from inertial.dynamics.missing_effects import DiagnosisInG
+from inertial.dynamics.rotation import RotationFit
+from inertial.dynamics.rotation_diagnosis import diagnose_rotation
 from inertial.fits.wander import fit_lot_with_wander
 from inertial.frames import force_from_angles
 from inertial.state import State
@@ -146,7 +148,7 @@ def points_of(
     return procedure.reduce(parts_of(recipe)[0], taken, nominal_device(readings)), minutes(readings)
 
 
-def diagnosed(points: Any, unit: str, effects: Sequence[str]) -> RotationDiagnosis:
+def diagnosed(points: Any, unit: str, effects: Sequence[str]) -> DiagnosisInG[RotationFit]:
     """The verdict on a model of one unit."""
     return diagnose_rotation(data_of(points[points["unit"] == unit]), effects)
 

@@ -26,23 +26,21 @@ files, not this page. A recipe lists the procedures of a lot in order, as tables
 
 def page() -> str:
     """The whole page as Markdown."""
-    parts = [HEAD, *(_section(one) for one in PROCEDURES.values()), _effects()]
+    parts = [HEAD, *(_section(*named) for named in PROCEDURES.items()), _effects()]
     return "\n".join(parts)
 
 
-def _section(one: Procedure) -> str:
+def _section(name: str, one: Procedure) -> str:
     roles = ", ".join(f"`{role}`" for role in one.roles) or "table, chamber and reader"
     roles += "" if type(one).roles_for is Procedure.roles_for else " (`climate` where the part asks for another air)"
-    lines = [f"## {one.name}", "", f"{one.title}: {one.states}.", "", f"Source: {one.source}. Station: {roles}.", ""]
+    lines = [f"## {name}", "", f"{one.title}: {one.states}.", "", f"Source: {one.source}. Station: {roles}.", ""]
     lines += [" ".join((one.part.__doc__ or "").split()), ""]
-    if (RECIPES / f"{one.name}.toml").is_file():
-        lines += [f"Sample: `tumbleline run deploy/recipes/procedures/{one.name}.toml`.", ""]
-    fields = {name: field for name, field in one.part.model_fields.items() if name != "kind"}
+    if (RECIPES / f"{name}.toml").is_file():
+        lines += [f"Sample: `tumbleline run deploy/recipes/procedures/{name}.toml`.", ""]
+    fields = {key: field for key, field in one.part.model_fields.items() if key != "kind"}
     if fields:
         lines += ["| key | default |", "|---|---|"]
-        lines += [
-            f"| `{name}` | {'required' if f.is_required() else f'`{_default(f)}`'} |" for name, f in fields.items()
-        ]
+        lines += [f"| `{key}` | {'required' if f.is_required() else f'`{_default(f)}`'} |" for key, f in fields.items()]
         lines.append("")
     if one.figures:
         lines += ["| figure for limits | unit | meaning |", "|---|---|---|"]

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from pipelines.archive import Archive
+from schemas.errors import WrongUse, did_you_mean
 from tumbleline.calibrations import Calibration, K
 from tumbleline.pictures import Picture
 from tumbleline.recordings import Recording
@@ -50,8 +51,6 @@ class ArchiveView:
         WrongUse
             No run has the unit, no calibration of it is valid on that day, or a day is given without a unit.
         """
-        from schemas.errors import WrongUse, did_you_mean
-
         if not at:
             rows = self.query(_OF_ALL_RUNS)
             rows = rows.assign(U=K * rows["standard_error"].astype(float))
@@ -96,7 +95,6 @@ class ArchiveView:
     def plot(self, unit: str, effect: str = "bias") -> Picture:
         """Change of a unit's coefficients of an effect since they were measured first, with U (k = 2) as bars, by day."""
         from pipelines.drawing.chart import SEVERAL, Chart, Plot, PlotAxis, Trace
-        from schemas.errors import WrongUse
 
         rows = self.coefficients(unit)
         rows = rows[rows["effect"] == effect]

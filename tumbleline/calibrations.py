@@ -9,10 +9,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.archive import Archive, Run
+from pipelines.archive import Archive, Run, files
+from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.units import AXES
 from tumbleline.pictures import Picture, as_html, as_text, rounded_table
-from tumbleline.recordings import Recording, Source
+from tumbleline.recordings import Recording, Source, listed, read
 
 K = 2.0  # coverage factor of U
 
@@ -81,7 +82,6 @@ class Calibration:
         from pipelines.export.corrected import corrected, fit_of_unit, table_of
         from pipelines.export.recording import at_calibrated_supply, recording_of
         from pipelines.jobs.model_files import use_formulas_of
-        from schemas.errors import DataRejected, WrongUse
 
         use_formulas_of(self.run)
         fit = fit_of_unit(self.run, str(unit), failed=True, revoked=False)
@@ -128,9 +128,7 @@ class Calibration:
         str or bytes
             The content of the file; bytes for a binary format.
         """
-        from pipelines.archive import files
         from pipelines.export import FORMATS, ExportSettings, export_files, unit_calibrations
-        from schemas.errors import WrongUse, did_you_mean
 
         if form not in FORMATS:
             raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
@@ -206,7 +204,6 @@ def fit(
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.rerun import again
     from pipelines.tables.leave_out import named_dwells
-    from tumbleline.recordings import listed, read
 
     given = recording if isinstance(recording, Recording) else read(recording)
     archive = Archive(given.run.archive.root)

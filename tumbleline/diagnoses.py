@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from schemas.errors import WrongUse
 from tumbleline.calibrations import Calibration
 from tumbleline.pictures import Picture, as_html, as_text
 from tumbleline.recordings import Recording, Source, listed, read
@@ -92,7 +93,6 @@ class ModelDiagnosis(JudgedModel):
         """
         from pipelines.report.diagnosis_pictures import driver_chart
         from pipelines.report.residuals import drivers_shown, lot_residuals
-        from schemas.errors import WrongUse
 
         made = self._made
         drivers = [] if made is None or made.diagnosis is None else drivers_shown(made.diagnosis)
@@ -105,7 +105,6 @@ class ModelDiagnosis(JudgedModel):
         """Write the diagnosis with its pictures as one HTML file."""
         from pipelines.archive import files
         from pipelines.report.diagnosis import render_diagnosis
-        from schemas.errors import WrongUse
 
         if self._made is None:
             raise WrongUse("report: this diagnosis was kept as a document alone; diagnose the recording again")
@@ -114,8 +113,6 @@ class ModelDiagnosis(JudgedModel):
         return Path(path)
 
     def _repr_html_(self) -> str:
-        from schemas.errors import WrongUse
-
         try:
             picture = self.plot()
         except WrongUse:

@@ -13,6 +13,7 @@ import pandas as pd
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
+from schemas.errors import DataRejected, WrongUse
 from tumbleline.pictures import Picture, as_html, as_text
 
 if TYPE_CHECKING:
@@ -97,7 +98,6 @@ def listed(names: Sequence[str] | str | None, what: str, run: Run | None = None)
     """Ids of effects from a list, or from a text with commas as of a command; where none are given those of the run, or None."""
     from pipelines.diagnosis.inputs import effects_of
     from pipelines.jobs.model_files import refuse_unknown_effects
-    from schemas.errors import WrongUse
 
     if names is None:
         return None if run is None else effects_of(run)
@@ -144,7 +144,6 @@ def read(
         The recording cannot be used; the message says why.
     """
     from pipelines.importers.exchange import checked, checked_history, is_exchange, read_history
-    from schemas.errors import DataRejected, WrongUse
 
     several: Any = source  # anything may be given
     if units is not None and not isinstance(cast("Any", units), Mapping):
@@ -199,8 +198,6 @@ def read(
 
 def _refuse(unused: Sequence[str], of: str) -> None:
     """Refuse what :func:`read` was given and would not use."""
-    from schemas.errors import WrongUse
-
     if unused:
         raise WrongUse(
             f"read: {', '.join(unused)}: not used for {of}, which states it itself or has none; leave it out"
@@ -247,7 +244,6 @@ def _imported(
     from pipelines.importers.mapping import build
     from pipelines.importers.proposal import Proposal
     from pipelines.importers.recognition import recognise
-    from schemas.errors import WrongUse
 
     seen = recognise(paths, join=stated.get("join", "rows" if len(paths) > 1 else ""))
     name = " + ".join(path.name for path in paths)

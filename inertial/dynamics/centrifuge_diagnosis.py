@@ -8,7 +8,7 @@ import numpy as np
 from inertial.arrays import Array
 from inertial.dynamics.centrifuge import radii_as_observed
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
-from inertial.dynamics.missing_effects import FOLDS, BadPoint, Judged, breakers_of, judge, judge_points
+from inertial.dynamics.missing_effects import FOLDS, BadPoint, DiagnosisInG, Judged, judge, judge_points
 from inertial.errors import NotIdentified
 
 DEFAULT = ("second_order", "third_order")
@@ -33,19 +33,6 @@ class SpinFit:
         """Coefficient of an effect and its standard uncertainty."""
         k = 2 + self.effects.index(name)
         return float(self.value[k]), float(self.error[k])
-
-
-@dataclass(frozen=True)
-class SpinDiagnosis(Judged[SpinFit]):
-    """The verdict on a model of a centrifuge test.
-
-    error_g, extended_g : rms residual
-    next_steps : the measurements that separate the effects of the classes
-    """
-
-    error_g: float
-    extended_g: float
-    next_steps: tuple[str, ...]
 
 
 def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]) -> SpinFit:
@@ -85,14 +72,13 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
     )
 
 
-def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence[str] = DEFAULT) -> SpinDiagnosis:
+def diagnose_spins(
+    points: Spins, output: Array, error: Array, effects: Sequence[str] = DEFAULT
+) -> DiagnosisInG[SpinFit]:
     """The verdict on bias, scale and ``effects``, with the classes of effects that make the model adequate."""
     judged, _ = judge_points(len(output), lambda rows: _judged(points.picked(rows), output[rows], error[rows], effects))
-    before, after = (float(np.sqrt(np.mean(fit.residuals**2))) for fit in (judged.fit, judged.extended))
     again = tuple(f"measure {points.acceleration[k]:+.4g} g again: it departs alone" for k in judged.alone)
-    return SpinDiagnosis(
-        **vars(judged), error_g=before, extended_g=after, next_steps=again + breakers_of(judged.classes, EFFECTS)
-    )
+    return DiagnosisInG.of(judged, EFFECTS, again)
 
 
 def _judged(points: Spins, output: Array, error: Array, effects: Sequence[str]) -> Judged[SpinFit]:

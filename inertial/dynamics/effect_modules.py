@@ -11,17 +11,16 @@ AnyEffect = TypeVar("AnyEffect")
 class DynamicEffect:
     """What every effect of a dynamic test states.
 
-    id : name of its module · equation, source : text for reports · breaker : measurement that separates it from other effects
+    equation, source : text for reports · breaker : measurement that separates it from other effects; its name is its module's
     """
 
-    id: ClassVar[str]
     equation: ClassVar[str]
     source: ClassVar[str]
     breaker: ClassVar[str]
 
 
 class IncompleteEffect(Exception):
-    """A module without exactly one effect of its own name; its author must correct it."""
+    """A module without exactly one effect; its author must correct it."""
 
 
 def effects_of(package: str, path: Iterable[str], base: type[AnyEffect]) -> dict[str, AnyEffect]:
@@ -30,7 +29,7 @@ def effects_of(package: str, path: Iterable[str], base: type[AnyEffect]) -> dict
     Raises
     ------
     IncompleteEffect
-        A module does not define exactly one effect with its own name.
+        A module does not define exactly one effect.
     """
     effects: dict[str, AnyEffect] = {}
     for info in iter_modules(list(path)):
@@ -38,7 +37,7 @@ def effects_of(package: str, path: Iterable[str], base: type[AnyEffect]) -> dict
             continue
         content = vars(import_module(f"{package}.{info.name}")).values()
         defined: list[Any] = [c for c in content if isinstance(c, type) and issubclass(c, base) and c is not base]
-        if len(defined) != 1 or defined[0].id != info.name:
-            raise IncompleteEffect(f"{package}.{info.name}: one effect with id '{info.name}' is needed; define it")
+        if len(defined) != 1:
+            raise IncompleteEffect(f"{package}.{info.name}: {len(defined)} effects, one is needed; define it alone")
         effects[info.name] = defined[0]()
     return effects

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -110,6 +110,27 @@ class Judged(Generic[AnyFit]):
     def recommended(self) -> tuple[str, ...]:
         """One effect per class, the best of it."""
         return tuple(effect_class.effects[0] for effect_class in self.classes)
+
+
+@dataclass(frozen=True)
+class DiagnosisInG(Judged[AnyFit]):
+    """The verdict on a model of outputs in g.
+
+    error_g, extended_g : rms residual
+    next_steps : points to be measured again, and the measurements that separate the effects of the classes
+    """
+
+    error_g: float
+    extended_g: float
+    next_steps: tuple[str, ...]
+
+    @classmethod
+    def of(cls, judged: Judged[Any], effects: Mapping[str, DynamicEffect], again: tuple[str, ...] = ()) -> Self:
+        """The diagnosis of a verdict whose fits have residuals in g; ``again``: points to be measured again."""
+        before, after = (float(np.sqrt(np.mean(fit.residuals**2))) for fit in (judged.fit, judged.extended))
+        return cls(
+            **vars(judged), error_g=before, extended_g=after, next_steps=again + breakers_of(judged.classes, effects)
+        )
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
-"""Risk of decisions: probability of false acceptance and false rejection, for one unit and for production (JCGM 106:2012).
+"""Risk of decisions: probability of false acceptance and false rejection for production (JCGM 106:2012).
 
-Specific risk (7.3, 7.4): what is known of one unit after its measurement. Global risk (9): over units X ~ N(μ, σ_p) that are
+The specific risk (7.3, 7.4), of one unit, is in :mod:`schemas.decisions`. Global risk (9): over units X ~ N(μ, σ_p) that are
 measured as Y = X + N(0, u) and accepted where A_L ≤ Y ≤ A_U.
 """
 
@@ -26,13 +26,6 @@ class GlobalRisk:
     pfa: float
     pfr: float
     accepted: float
-
-
-def outside(value: float, u: float, lower: float, upper: float) -> float:
-    """Probability that a quantity measured as ``value`` with standard uncertainty ``u`` lies outside limits (JCGM 106, 7.4)."""
-    if not u > 0.0:
-        return float(not lower <= value <= upper)
-    return float(ndtr((lower - value) / u) + ndtr((value - upper) / u))
 
 
 def lot_risk(

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from inertial.counts import number_of, size_text
-from pipelines.archive import Archive
+from pipelines.archive import Archive, signatures
 from pipelines.cli.archive_diff import diff
 from pipelines.cli.archive_query import query
 from pipelines.cli.groups import group
@@ -74,8 +74,6 @@ def key(
     as_json: JsonOption = False,
 ) -> None:
     """Make the key that signs manifests, outside the archive, and show its public key."""
-    from pipelines.archive import signatures
-
     refuse_standard_output(output, "archive key", "a private key is never printed")
     path = output or (signatures.key_file() if public else signatures.default_key_file())
     if path is None:

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, files
 from pipelines.cli import options
 from pipelines.cli.options import Setting, argument, option
 from pipelines.cli.printing import (
@@ -132,7 +132,6 @@ def command(
 
 
 def _write(recording: "CorrectableRecording", done: "Corrected", output: Path) -> None:
-    from pipelines.archive import files
     from pipelines.export.corrected import table_of
 
     table = table_of(recording, done)

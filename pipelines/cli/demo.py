@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive.files import ELSEWHERE, writing
 from pipelines.cli.next_commands import Given, command_line, extension, judged_data
 from pipelines.cli.options import JsonOption, argument, option
 from pipelines.cli.printing import error_console, give, print_json, publish, remark, say
-from pipelines.cli.text.demo_text import print_ending
+from pipelines.cli.text.demo_text import print_discovery_demo, print_ending
 from schemas.errors import WrongUse
 from schemas.progress import Progress
 
@@ -65,7 +66,6 @@ def command(
     if lots is not None:
         _archive(folder, drawn, lots, as_json=as_json)
         return
-    from pipelines.archive.files import ELSEWHERE, writing
     from pipelines.demo.measure import measure
     from pipelines.demo.scenes import scene
 
@@ -90,8 +90,6 @@ def command(
 
 def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
     """An archive with something hidden in a wafer: written, judged, explained, and judged again with the effect in the model."""
-    from pipelines.archive.files import ELSEWHERE, writing
-    from pipelines.cli.text.demo_text import print_discovery_demo
     from pipelines.discovery.demonstration import made, played
     from pipelines.parallel import processors
 
@@ -104,7 +102,6 @@ def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
 
 def _practise(folder: Path, *, as_json: bool) -> None:
     """A station served faster than real time until Ctrl-C, its file in the folder, and faults from standard input."""
-    from pipelines.archive.files import ELSEWHERE, writing
     from pipelines.cli.terminal import stopped
     from pipelines.demo.practice import RECIPE, TypedFaults, free_port, practice_file, practice_lot
     from schemas.station import load_station

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, files
 from pipelines.cli import options
 from pipelines.cli.options import option
 from pipelines.cli.printing import conclude, error_console, publish
@@ -141,7 +141,6 @@ def write_next(path: Path, document: DiagnosisDocument, base: Recipe, home: Path
     base : the recipe that the dwells were measured with; home : its folder
     source : the dwells as they were named
     """
-    from pipelines.archive import files
     from pipelines.cli.next_commands import command_line
     from pipelines.diagnosis.next_measurement import next_recipe, reasons
     from pipelines.jobs.recipe_text import limits_from, recipe_text

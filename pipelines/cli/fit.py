@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.printing import conclude, error_console, remark, say
-from pipelines.cli.text.verdict_text import print_verdict_of_fit
+from pipelines.cli.text.verdict_text import judged, print_verdict_of_fit
 from pipelines.stages.figures import plain_reason
 from schemas.errors import WrongUse
 from schemas.foreign import shown
@@ -40,7 +40,6 @@ def command(
     from pipelines.chain.runner import Runner
     from pipelines.cli.inputs import add_effects
     from pipelines.cli.summary import all_passed, print_result, summary
-    from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import job_of_run
 
     if Path(run).is_file():

@@ -107,8 +107,6 @@ def _refuse_unknown_plan(name: str) -> None:
 def _required_errors(
     options: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]
 ) -> Requirement:
-    from pipelines.jobs.model_files import refuse_unknown_effects
-
     criteria = {name.lower(): name for name in get_args(Criterion)}
     if options.criterion.lower() not in criteria:
         known = [*get_args(Criterion), "T"]

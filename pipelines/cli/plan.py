@@ -16,6 +16,7 @@ from pipelines.cli.plan_order import order
 from pipelines.cli.printing import conclude, give, is_standard_output, print_text, remark
 from pipelines.cli.text.plan_text import print_optimum, print_plan, print_procedures
 from schemas.errors import RecipeInvalid
+from schemas.station import load_station
 
 if TYPE_CHECKING:
     from pipelines.planning.context import PlanContext
@@ -112,7 +113,6 @@ def plan_recipe(
     from pipelines.jobs.terms import planned_terms, refuse_missing_full, refused_by_run
     from pipelines.planning.context import noise_of, plan_context, plan_of_procedures, procedure_rows
     from pipelines.planning.plan import plan
-    from schemas.station import load_station
 
     made = options.outputs(output, {"page": options.PAGES, "pictures": ("",)}, "plan")
     page, pictures = made.get("page"), made.get("pictures")
@@ -209,7 +209,6 @@ def optimise(
     from pipelines.jobs.recipes import folder_of
     from pipelines.jobs.releases import planned_recipe
     from pipelines.planning.context import noise_of
-    from schemas.station import load_station
 
     files_by_kind = options.outputs(output, {"recipe": (".toml", "-"), "page": options.PAGES}, "plan optimise")
     file, page = files_by_kind.get("recipe"), files_by_kind.get("page")

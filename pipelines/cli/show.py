@@ -10,7 +10,7 @@ import typer
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
 from pipelines.archive.run import lost_files, names_in
-from pipelines.certificates import Calibration
+from pipelines.certificates import Calibration, Ledger
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import cell, conclude, error_console, give, print_json, print_table, remark, say
 from schemas.errors import DONE, PART_FAILED, ArchiveUnusable, WrongUse
@@ -67,8 +67,6 @@ def command(
 
 def _is_unit(archive: Archive, name: str) -> bool:
     """Whether no run name begins so, and a unit with calibrations has this serial number."""
-    from pipelines.certificates import Ledger
-
     if name == "latest" or any(run.startswith(name) for run in archive.run_ids()):
         return False
     return bool(Ledger(archive).events(name))
@@ -145,7 +143,6 @@ def print_remarks(run: Run, serials: Sequence[str]) -> None:
 
 def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json: bool) -> bool:
     """Print the calibration that is valid on a day; return whether there is one."""
-    from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of, today
     from pipelines.certificates.entries import STATIC
 

@@ -9,7 +9,7 @@ from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, TrustOption, argument, option
 from pipelines.cli.printing import conclude, console, error_console, say
-from pipelines.integrity import Report
+from pipelines.integrity import Report, verify
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -54,7 +54,6 @@ def command(
     """
     from pipelines.archive.signatures import public_keys
     from pipelines.audit.index import check_index
-    from pipelines.integrity import verify
 
     if files := certificate_files(runs or ()):
         check_certificates(files, [Path(path) for path in trust or ()], archive, laboratory, as_json=as_json)

@@ -301,8 +301,8 @@ class ComparisonDocument(TypedDict):
     progress: Annotated[Confirmation | None, "null without a version to compare with"]
 
 
-class VersionErrors(TypedDict):
-    """The errors of one version of a model."""
+class JudgedVersion(TypedDict):
+    """The errors of one version of a model, and the verdict on its change."""
 
     version: int
     added: list[str]
@@ -317,7 +317,7 @@ class VersionErrors(TypedDict):
     warnings: list[str]
 
 
-class VersionDocument(VersionErrors):
+class VersionDocument(JudgedVersion):
     """A version of a model; its errors are null without `--dwells`."""
 
     removed: list[str]

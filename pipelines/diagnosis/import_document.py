@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from pipelines.importers.content import Content
-from pipelines.importers.exchange import is_exchange
+from pipelines.importers.exchange import checked, is_exchange, read_history
 from pipelines.importers.files import SourceFile
 from pipelines.importers.mapping import Mapping
 from schemas.errors import WrongUse
@@ -93,7 +93,6 @@ def _table_of_dwells(
 ) -> dict[str, Any]:
     """Import a table of dwells in the exchange format, whose column names replace a mapping; returns the document."""
     from pipelines.diagnosis.inputs import file_beside
-    from pipelines.importers.exchange import checked, read_history
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
     beside, device = file_beside(str(path), "history"), str(keys.get("device", ""))

@@ -15,7 +15,7 @@ from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.doctor.software import software_checks
 from schemas.errors import TumblelineError
 from schemas.shipped import PRODUCT, shipped
-from stations.overview import Overview
+from stations.overview import Overview, looked_at
 from stations.safety.folder import VARIABLE, state_folder
 
 LEAST_FREE_GB = 1.0  # free space that an archive needs, GB, by default
@@ -109,7 +109,6 @@ def station_checks(path: Path | None) -> list[Check]:
     """The checks of a station's file and, if it is of hardware, of its devices."""
     from schemas.lot import Lot
     from schemas.station import load_station
-    from stations.overview import looked_at
 
     if path is None:
         return [Check(PART, "file", "not configured", "no station is named", "", "name its file with --station")]

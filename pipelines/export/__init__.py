@@ -1,6 +1,6 @@
 """Export of coefficients for firmware, autopilots and spreadsheets. a = K(θ)⁻¹·(ã − b(θ)), θ = T − 25 °C."""
 
-from pipelines.export.formats import FORMATS, export_files, export_text
+from pipelines.export.formats import FORMATS, export_files
 from pipelines.export.polynomials import UnitCalibration, revoked_units, unit_calibrations
 from pipelines.export.settings import ExportSettings, device_ids
 
@@ -10,7 +10,6 @@ __all__ = [
     "UnitCalibration",
     "device_ids",
     "export_files",
-    "export_text",
     "revoked_units",
     "unit_calibrations",
 ]

@@ -21,7 +21,7 @@ from pipelines.export.polynomials import UnitCalibration, refuse_fewer_axes, uni
 from pipelines.export.recording import CorrectableRecording
 from pipelines.export.unit_noise import UnitCurve, curve_of_unit, required_noise
 from pipelines.importers.exchange import refuse_other_procedures
-from pipelines.tables.calibration import read_calibration
+from pipelines.tables.calibration import read_calibration, symmetric
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.units import AXES, MICRO
@@ -153,8 +153,7 @@ def _budget(run: Run, unit: str, size: int) -> Array | None:
     matrix = np.zeros((size, size))
     row, column, value = (rows[name].to_numpy() for name in ("row", "column", "value"))
     matrix[row, column] = value
-    matrix[column, row] = value
-    return matrix
+    return symmetric(matrix)
 
 
 def corrected(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking | None) -> Corrected:

@@ -84,7 +84,7 @@ def import_waveforms(
     records: list[ProcedureRecord] = []
     recordings = [_recording(path, layout, stated, test) for path in paths]
     sources, out_unit = [made.source for made in recordings], recordings[0].unit
-    stated = _scaled(stated, test, out_unit, part)
+    stated = _scaled(stated, out_unit, part)
     driven = [made.samples if made.reference is None else made.reference for made in recordings]
     try:
         stated = test.completed(stated, driven)
@@ -189,7 +189,7 @@ def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[s
     return can[procedure], stated, content, float(full_scale)
 
 
-def _scaled(part: Any, procedure: FromWaveforms, out_unit: str, path: Path | None) -> Any:
+def _scaled(part: Any, out_unit: str, path: Path | None) -> Any:
     """The part with a scale: the scale is stated, or follows from an output that is an acceleration.
 
     A recording made elsewhere has no multi-position test that determines it.
@@ -199,7 +199,7 @@ def _scaled(part: Any, procedure: FromWaveforms, out_unit: str, path: Path | Non
     if out_unit in ACCELERATION:
         return part.model_copy(update={"scale": 1.0 / ACCELERATION[out_unit]})
     raise WrongUse(
-        f"import: procedure {procedure.name} has no scale, output per g is needed for figures in g; add scale = … to "
+        f"import: procedure {part.kind} has no scale, output per g is needed for figures in g; add scale = … to "
         f"{path or 'a file and give it with --set FILE.toml'}"
     )
 

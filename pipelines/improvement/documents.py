@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from pipelines.diagnosis.documents import DiagnosisDocument, VersionErrors
+from pipelines.diagnosis.documents import DiagnosisDocument, JudgedVersion
 
 
 class ImprovementChoice(TypedDict):
@@ -18,7 +18,7 @@ class ImprovementChoice(TypedDict):
     added: bool
 
 
-class LadderRow(VersionErrors):
+class LadderRow(JudgedVersion):
     """The errors of one version of the model."""
 
     noise_ug: Annotated[float, "noise of the measurement by the last diagnosis, µg"]

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast, get_type_hints
 
-from pipelines.diagnosis.documents import ComparisonDocument, DiagnosisDocument, VersionDocument, VersionErrors
+from pipelines.diagnosis.documents import ComparisonDocument, DiagnosisDocument, JudgedVersion, VersionDocument
 from pipelines.improvement.documents import ImproveDocument, ImprovementChoice, LadderRow
 from schemas.errors import WrongUse, did_you_mean
 
@@ -230,10 +230,8 @@ class Improvement:
         if noise is None:
             return []
         rows = errors_by_version(versions, given, lambda: self.attendant.working("fitting"))
+        names = get_type_hints(JudgedVersion)
         return [
-            cast(
-                "LadderRow",
-                {**{name: row.get(name) for name in VersionErrors.__annotations__}, "noise_ug": noise},
-            )
+            cast("LadderRow", {name: value for name, value in row.items() if name in names} | {"noise_ug": noise})
             for row in rows
         ]

@@ -11,7 +11,7 @@ from inertial.next_measurement.proposals import Proposal
 from inertial.planning.sequences import SequenceStep
 from pipelines.archive import Archive, Run, code_hash, files, stage_key
 from pipelines.chain.runner import Runner, from_station
-from pipelines.diagnosis.diagnose import document, examined
+from pipelines.diagnosis.diagnose import Examination, document, examined
 from pipelines.diagnosis.documents import DiagnosisDocument, NextMeasurement
 from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
 from pipelines.inquiry.documents import InquiryDocument, InquiryRound
@@ -233,7 +233,6 @@ class Inquiry:
         key = stage_key("inquiry", inputs, parameters, code)
         if run.has_report(key):
             return
-        from pipelines.diagnosis.diagnose import Examination
         from pipelines.report.diagnosis import render_diagnosis
 
         diagnosis = {key: value for key, value in joint.document.items() if key not in {"breakers", "offer"}}

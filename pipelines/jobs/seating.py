@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.errors import WrongUse
+from schemas.errors import StationError, WrongUse
 from schemas.foreign import foreign, shown
 from schemas.lot import Lot
 from schemas.serials import refuse_unusable_serials, serial_fault
@@ -64,8 +64,6 @@ def disagreements(station: Station, lot: Lot) -> list[str]:
 
     A slot that does not answer is no difference: its unit is refused later, and the others continue.
     """
-    from schemas.errors import StationError
-
     entries: list[str] = []
     for unit in lot.units:
         try:

@@ -37,7 +37,7 @@ from schemas.units import AXES
 
 
 class IncompleteProcedure(Exception):
-    """A module without a procedure, or with a name or figure that another has: its author must correct it."""
+    """A module without a procedure, or with a figure that another has: its author must correct it."""
 
 
 def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
@@ -48,7 +48,7 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     IncompleteProcedure
         A module has no PROCEDURE, a procedure declares what it cannot do, or two procedures declare the same figure.
     """
-    procedures: list[Procedure] = []
+    procedures: dict[str, Procedure] = {}
     for info in iter_modules(path):
         module = import_module(f"{package}.{info.name}")
         procedure = getattr(module, "PROCEDURE", None)
@@ -57,20 +57,15 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
         )
         if procedure is None and not any(issubclass(kind, Procedure) and not isabstract(kind) for kind in classes):
             continue  # a part that procedures share
-        if not isinstance(procedure, Procedure) or procedure.name != info.name:
-            raise IncompleteProcedure(
-                f"{package}.{info.name}: no PROCEDURE of this name, one is needed; define PROCEDURE = … with name = '{info.name}'"
-            )
+        if not isinstance(procedure, Procedure):
+            raise IncompleteProcedure(f"{package}.{info.name}: no PROCEDURE, one is needed; define PROCEDURE = …")
         _refuse_half(f"{package}.{info.name}", procedure)
-        procedures.append(procedure)
-    figures = [figure.name for procedure in procedures for figure in procedure.figures]
+        procedures[info.name] = procedure
+    figures = [figure.name for procedure in procedures.values() for figure in procedure.figures]
     twice = sorted({name for name in figures if figures.count(name) > 1})
     if twice:
         raise IncompleteProcedure(f"{package}: figure {', '.join(twice)} is declared twice; rename one")
-    return {
-        procedure.name: procedure
-        for procedure in sorted(procedures, key=lambda procedure: (procedure.order, procedure.name))
-    }
+    return dict(sorted(procedures.items(), key=lambda named: (named[1].order, named[0])))
 
 
 def _refuse_half(module: str, procedure: Procedure) -> None:

@@ -17,6 +17,8 @@ from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.recipe import Recipe, Strict
 from schemas.station import StationConfig
 
+Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
+
 
 class Part(Strict):
     """The part of a recipe that belongs to one procedure: a table ``[[procedures]]``; ``kind`` names the procedure."""
@@ -24,7 +26,13 @@ class Part(Strict):
     kind: Any  # each procedure narrows it to its own name
 
 
-class NominalScale(Part):
+class AtTemperature(Part):
+    """A part whose records are taken at one temperature of the chamber."""
+
+    temperature_C: Celsius = 25.0
+
+
+class NominalScale(AtTemperature):
     """A part of a procedure whose figures are in g: the scale comes from the multi-position test, or is stated.
 
     ``scale`` is the nominal scale, output per g, for lists without a multi-position test before the procedure.
@@ -39,11 +47,12 @@ class Procedure(ABC):
     A subclass lists its steps. What else it can do is stated by the classes below that it inherits, each with abstract methods:
     :class:`Evaluated`, :class:`InG`, :class:`OnEquipment`, :class:`SetsEquipment`, :class:`FromWaveforms`, :class:`Compares`.
 
-    name : of the module, and ``kind`` in recipes · title : heading in the report · order : procedures are listed by it
+    Its name is the module's, and ``kind`` in recipes.
+
+    title : heading in the report · order : procedures are listed by it
     roles : equipment that a station must have · source : standard, edition and part · states : its results in one line
     """
 
-    name: ClassVar[str]
     title: ClassVar[str]
     order: ClassVar[int]
     states: ClassVar[str]

@@ -25,14 +25,12 @@ class BiasStabilityPart(NominalScale):
     kind: Literal["bias_stability"]
     lasting_s: Annotated[Positive, Field(ge=1000.0, le=86400.0)] = 3600.0
     rate_hz: Annotated[Positive, Field(ge=1.0, le=1000.0)] = 10.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     pose_deg: tuple[float, float] = (0.0, 0.0)
 
 
 class BiasStability(InG, RecordByRecord):
     """A bias record of an hour."""
 
-    name = "bias_stability"
     title = "Bias stability"
     order = 40
     states = "standard deviation of 100 s means, drift per hour, Allan deviation at 100 s, and the other definitions"

@@ -10,8 +10,9 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial
-from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagnose_spins
+from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinFit, diagnose_spins
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
+from inertial.dynamics.missing_effects import DiagnosisInG
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import InG, NominalScale, OnEquipment, RecordByRecord, refuse_unknown_effects, scale_of
@@ -67,7 +68,6 @@ class CentrifugePart(NominalScale):
     point_ppm: NotNegative = 2.0
     record_s: Annotated[Positive, Field(le=600.0)] = 5.0
     full_scale_g: Positive = 30.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     effects: Annotated[list[str], Field(max_length=6)] = Field(default_factory=lambda: list(DEFAULT))
 
     @model_validator(mode="after")
@@ -108,7 +108,6 @@ class CentrifugePart(NominalScale):
 class CentrifugeTest(InG, OnEquipment, RecordByRecord):
     """Constant speeds on a centrifuge."""
 
-    name = "centrifuge"
     title = "Centrifuge"
     order = 130
     states = (
@@ -262,7 +261,7 @@ def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
 
 
-def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
+def judged(part: CentrifugePart, rows: pd.DataFrame) -> DiagnosisInG[SpinFit]:
     """The diagnosis of the part's model on the points of one unit."""
     force, value, error = numbers(rows)
     radius = rows["radius_m"].to_numpy(dtype=float) if part.radii_m else np.full(force.size, part.radius_m)

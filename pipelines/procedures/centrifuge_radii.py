@@ -15,8 +15,9 @@ from inertial.dynamics.centrifuge import (
     linearity_error,
     linearity_percent,
 )
-from inertial.dynamics.centrifuge_diagnosis import SpinDiagnosis
+from inertial.dynamics.centrifuge_diagnosis import SpinFit
 from inertial.dynamics.centrifuge_effects import EFFECTS
+from inertial.dynamics.missing_effects import DiagnosisInG
 from pipelines.drawing.chart import SEVERAL, Trace
 from pipelines.procedures.figures import FigureValue, diagnosis_texts, verdict_of, with_uncertainty
 from pipelines.procedures.recorded import numbers
@@ -143,7 +144,7 @@ def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tup
     return out
 
 
-def diagnosis_text(diagnosis: SpinDiagnosis) -> list[tuple[str, str]]:
+def diagnosis_text(diagnosis: DiagnosisInG[SpinFit]) -> list[tuple[str, str]]:
     """The diagnosis in sentences: subject and text."""
 
     def size(name: str) -> str:

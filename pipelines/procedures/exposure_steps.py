@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from pipelines.procedures.base import NominalScale
+from pipelines.procedures.base import Celsius, NominalScale
 from pipelines.procedures.climate import MINUTE_S, Leg, leg_step
 from pipelines.procedures.recorded import ProcedureStep
 from schemas.bounds import Positive
@@ -34,7 +34,6 @@ DRY = "dry"
 """Poses at the temperatures of the exposure, in the air of the room before it."""
 SAME_K = 1.0
 """Within which two temperatures are one."""
-Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
 
 
 class ExposurePart(NominalScale):
@@ -53,7 +52,6 @@ class ExposurePart(NominalScale):
     cycles: Annotated[int, Field(ge=1, le=100)] | None = None
     repeats: Annotated[int, Field(ge=2, le=20)] = 2
     window_s: Annotated[Positive, Field(ge=2.0, le=600.0)] = 10.0
-    temperature_C: Celsius = 25.0
     around_K: Annotated[Positive, Field(ge=2.0, le=50.0)] = 10.0
 
     @model_validator(mode="after")

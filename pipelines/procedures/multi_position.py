@@ -16,7 +16,6 @@ class MultiPositionPart(Part):
 class MultiPosition(Procedure):
     """Static dwells over poses and temperatures."""
 
-    name = "multi_position"
     title = "Multi-position test"
     order = 10
     states = "bias, scale, misalignment, nonlinearity and their temperature coefficients, by the recipe's model"

@@ -72,7 +72,6 @@ class RandomVibrationPart(NominalScale):
     effects: Annotated[list[str], Field(min_length=1, max_length=6)] = Field(
         default_factory=lambda: ["second_order", "delay"]
     )
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
     @field_validator("profile")
     @classmethod
@@ -90,7 +89,6 @@ class RandomVibrationPart(NominalScale):
 class RandomVibration(InG, OnEquipment, Compares):
     """Gaussian vibration by a profile."""
 
-    name = "random_vibration"
     title = "Random vibration"
     order = 115
     states = "rectification over g rms²; transfer function H1 with coherence and its model; density against tolerance"

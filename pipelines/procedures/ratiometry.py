@@ -11,7 +11,7 @@ from inertial.dynamics.ratiometry import Follows, departures, largest_departure,
 from inertial.dynamics.stability import difference_error, short_noise
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import Part, RecordByRecord, SetsEquipment
+from pipelines.procedures.base import AtTemperature, RecordByRecord, SetsEquipment
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, with_uncertainty, worst
 from pipelines.procedures.recorded import Device, ProcedureStep, Taken, noise_columns, pooled_noise
 from schemas.bounds import NotNegative, Positive, Wait
@@ -28,7 +28,7 @@ FARTHEST = 0.5  # of the nominal supply
 SENSITIVITY, ZERO, SLOPE = "supply_sensitivity_percent", "supply_zero_percent_fs", "supply_zero_ug_V"
 
 
-class RatiometryPart(Part):
+class RatiometryPart(AtTemperature):
     """Both faces of every axis at each supply voltage; the first of ``supplies_V`` is the nominal voltage.
 
     ``follows`` states whether the output is to follow the supply (ratiometric) or to be independent of it.
@@ -44,7 +44,6 @@ class RatiometryPart(Part):
     )
     dwell_s: Annotated[Positive, Field(ge=1.0, le=3600.0)] = 10.0
     settle_s: Wait = 10.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     repeatability_ug: NotNegative = 0.0
 
     @model_validator(mode="after")
@@ -63,7 +62,6 @@ class RatiometryPart(Part):
 class Ratiometry(SetsEquipment, RecordByRecord):
     """Zero and sensitivity at several supply voltages."""
 
-    name = "ratiometry"
     title = "Supply voltage"
     order = 70
     states = "zero and sensitivity over the supply voltage: ratiometric error, or rejection of the supply"

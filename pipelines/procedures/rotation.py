@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from inertial.dynamics.missing_effects import DiagnosisInG
 from inertial.dynamics.rotation import PLACE_M, RotationData, RotationFit
-from inertial.dynamics.rotation_diagnosis import RotationDiagnosis, diagnose_rotation
+from inertial.dynamics.rotation_diagnosis import diagnose_rotation
 from inertial.dynamics.rotation_effects import EFFECTS
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Evaluated, InG
@@ -41,7 +42,6 @@ SCATTER_DEG = 0.1  # largest scatter of the encoder's readings: then 300 of them
 class Rotation(InG, Evaluated):
     """Planes of the device turned through gravity at steady rates, both ways."""
 
-    name = "rotation"
     title = "Constant-rate rotation"
     order = 32
     states = (
@@ -284,7 +284,7 @@ def _open(part: RotationPart) -> Texts:
     return texts
 
 
-def _diagnosis(diagnosis: RotationDiagnosis) -> Texts:
+def _diagnosis(diagnosis: DiagnosisInG[RotationFit]) -> Texts:
     def size(name: str) -> str:
         fit, shown = diagnosis.extended, EFFECTS[name]
         found = max((fit.of(term) for term in fit.of_effect(name)), key=lambda pair: abs(pair[0]))

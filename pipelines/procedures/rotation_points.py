@@ -48,7 +48,6 @@ class RotationPart(NominalScale):
     times: Annotated[int, Field(ge=1, le=20)] = 1
     lead_deg: Annotated[Positive, Field(ge=1.0, le=180.0)] = 20.0
     stand_s: Annotated[Positive, Field(ge=0.5, le=60.0)] = 1.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     effects: Annotated[list[str], Field(max_length=6)] = Field(default_factory=lambda: list(DEFAULT))
 
     @model_validator(mode="after")

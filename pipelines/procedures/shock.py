@@ -68,7 +68,6 @@ class ShockPart(NominalScale):
     axis: Literal["x", "y", "z"] = "z"
     window_s: Annotated[Positive, Field(ge=5.0, le=3600.0)] = 30.0
     settle_s: Wait = 30.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     reference_percent: NotNegative = 0.5
     transverse_percent: NotNegative = 0.3
     waveform_percent: Annotated[Positive, Field(le=20.0)] = 0.1
@@ -83,7 +82,6 @@ class ShockPart(NominalScale):
 class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
     """Half-sine shocks with the bias before and after."""
 
-    name = "shock"
     title = "Half-sine shock"
     order = 120
     states = "sensitivity by comparison, pulse, undershoot, return, zero and bias shift, survival; spectrum of reference and unit"

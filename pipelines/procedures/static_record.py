@@ -18,7 +18,6 @@ class StaticRecordPart(Part):
 class StaticRecord(Procedure):
     """One long record in one pose."""
 
-    name = "static_record"
     title = "Static record"
     order = 20
     states = "noise terms by the Allan deviation: Q, N, B, K, R"

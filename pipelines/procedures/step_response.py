@@ -13,7 +13,7 @@ from inertial.dynamics.pulses import span
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
-from pipelines.procedures.base import FromWaveforms, OnEquipment, Part
+from pipelines.procedures.base import AtTemperature, FromWaveforms, OnEquipment
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from pipelines.procedures.recorded import (
     REFERENCE,
@@ -38,7 +38,7 @@ MOST_EDGES = 16  # of the drive in a record: noise alone crosses its middle at e
 WIDTHS = (3.0, 1.9, 0.8)  # axes that agree still show one above the other
 
 
-class StepPart(Part):
+class StepPart(AtTemperature):
     """Steps of voltage on the self-test inputs of the devices, averaged about the edge of the drive.
 
     ``band_percent`` is the band of the settling time, of the step; ``hold_ms`` is the duration of a step.
@@ -49,13 +49,11 @@ class StepPart(Part):
     steps: Annotated[int, Field(ge=4, le=1000)] = 16
     hold_ms: Annotated[Positive, Field(ge=1.0, le=1000.0)] = 12.0
     band_percent: Annotated[Positive, Field(ge=0.05, le=20.0)] = 2.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
 
 class StepResponse(OnEquipment, FromWaveforms):
     """Steps of force by the self-test of the devices."""
 
-    name = "step_response"
     title = "Step response"
     order = 116
     states = "settling time into a band, overshoot, rise time, of the worst axis"

@@ -43,7 +43,6 @@ class SupplyRipplePart(NominalScale):
     rate_hz: Annotated[Positive, Field(le=100000.0)] = 4000.0
     lasting_s: Annotated[Positive, Field(ge=1.0, le=600.0)] = 5.0
     settle_s: Wait = 2.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
     @model_validator(mode="after")
     def _sampled(self) -> Self:
@@ -60,7 +59,6 @@ class SupplyRipplePart(NominalScale):
 class SupplyRipple(SetsEquipment, InG, RecordByRecord):
     """A sine on the supply of devices at rest."""
 
-    name = "supply_ripple"
     title = "Supply ripple"
     order = 71
     states = "rejection of ripple on the supply over its frequency"

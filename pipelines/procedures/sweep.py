@@ -59,7 +59,6 @@ def _leg(part: SweepPart, pressure: float) -> Leg:
 class Sweep(OnEquipment, FromWaveforms, Compares):
     """Stepped sine against a reference sensor."""
 
-    name = "sweep"
     title = "Sine comparison"
     order = 110
     states = (

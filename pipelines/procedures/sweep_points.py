@@ -12,17 +12,16 @@ from inertial.dynamics.frequency_response import frequency_response
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency, harmonic_distortion
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points
-from pipelines.procedures.base import Part, refuse_unknown_effects
+from pipelines.procedures.base import AtTemperature, Celsius, refuse_unknown_effects
 from pipelines.procedures.recorded import REFERENCE, Array, Device, ProcedureRecord, UnitRecord, point_rows
 from schemas.bounds import NotNegative, Positive
 from schemas.exposure_profile import Pressure
 
 FEWEST_POINTS = 8
-Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
 POINTS_OF_RECORD = 10_000  # numbers of points that belong to one record of many
 
 
-class SweepPart(Part):
+class SweepPart(AtTemperature):
     """Frequencies in steps of a fraction of an octave, the level as far as stroke and velocity of the exciter allow.
 
     Uncertainties are standard ones: ``reference_percent`` is common to all points, ``repeatability_percent`` and
@@ -42,7 +41,6 @@ class SweepPart(Part):
     axis: Literal["x", "y", "z"] = "z"
     cycles: Annotated[int, Field(ge=3, le=1000)] = 20
     record_s: Annotated[Positive, Field(le=60.0)] = 0.25
-    temperature_C: Celsius = 25.0
     other_temperatures_C: Annotated[list[Celsius], Field(max_length=20)] = Field(default_factory=list[float])
     pressures_hPa: Annotated[list[Pressure], Field(max_length=20)] = Field(default_factory=list[float])
     stroke_mm: Positive = 12.0

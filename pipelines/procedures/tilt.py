@@ -11,7 +11,7 @@ from scipy.stats import norm
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import Part, RecordByRecord, refuse_broken_turn
+from pipelines.procedures.base import AtTemperature, RecordByRecord, refuse_broken_turn
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
 from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
 from schemas.bounds import NotNegative, Positive
@@ -24,7 +24,7 @@ MICRO, MILLI = 1e6, 1e3
 NORMAL = float(norm.ppf(0.975))
 
 
-class TiltPart(Part):
+class TiltPart(AtTemperature):
     """A whole turn about one axis of the fixture.
 
     ``about`` is the axis of rotation: with ``x`` the outer axis turns (plane y–z), with ``y`` the inner axis is at 90° first
@@ -35,7 +35,6 @@ class TiltPart(Part):
     about: Literal["x", "y"] = "x"
     step_deg: Annotated[Positive, Field(le=60.0)] = 15.0
     dwell_s: Annotated[Positive, Field(le=3600.0)] = 10.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     orders: Literal[1, 3] = 3
     angle_uncertainty_deg: NotNegative = 0.002
 
@@ -48,7 +47,6 @@ class TiltPart(Part):
 class Tilt(RecordByRecord):
     """The output of the axes that lie in one plane, over a whole turn."""
 
-    name = "tilt"
     title = "Single-axis tilt"
     order = 30
     states = "bias, scale, angle of the input axis, K2 and K3 within 1 g, of the axes that lie in the plane"

@@ -48,7 +48,6 @@ class TransversePart(NominalScale):
     frequency_hz: Annotated[Positive, Field(ge=1.0, le=5000.0)] = 80.0
     level_g: Annotated[Positive, Field(le=50.0)] = 2.0
     record_s: Annotated[Positive, Field(ge=0.05, le=60.0)] = 0.5
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     reference_percent: NotNegative = 0.25
     scale_percent: NotNegative = 1.0
     repeatability_ppm: NotNegative = 5.0
@@ -62,7 +61,6 @@ class TransversePart(NominalScale):
 class TransverseTest(InG, OnEquipment, Compares):
     """The output of the sensitive axis under motion across it, over the angle of the unit about that axis."""
 
-    name = "transverse"
     title = "Transverse sensitivity"
     order = 114
     states = "largest transverse sensitivity in % of the sensitivity, and its direction"

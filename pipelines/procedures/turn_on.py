@@ -27,13 +27,11 @@ class TurnOnPart(NominalScale):
     off_s: Annotated[Positive, Field(le=86400.0)] = 600.0
     warm_up_s: Wait = 300.0
     window_s: Annotated[Positive, Field(le=3600.0)] = 30.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
 
 class TurnOn(InG, RecordByRecord):
     """Power cycles in one pose."""
 
-    name = "turn_on"
     title = "Turn-on to turn-on repeatability"
     order = 60
     states = "standard deviation of the bias between power cycles, the cycles' own error removed"

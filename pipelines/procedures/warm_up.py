@@ -29,13 +29,11 @@ class WarmUpPart(NominalScale):
     lasting_s: Annotated[Positive, Field(ge=60.0, le=86400.0)] = 1800.0
     rate_hz: Annotated[Positive, Field(ge=1.0, le=1000.0)] = 10.0
     window_s: Annotated[Positive, Field(le=600.0)] = 10.0
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
 
 class WarmUp(InG, RecordByRecord):
     """A record from power-on."""
 
-    name = "warm_up"
     title = "Warm-up time"
     order = 50
     states = "time from power-on until the smoothed output stays within its band"

@@ -92,7 +92,7 @@ def _missing(figure: str, recipe: Recipe) -> str:
         return FIGURES[figure].missing(recipe) if recipe.tumbles else "procedure multi_position"
     if figure in figures_of_recipe(recipe):
         return ""
-    owner = next(p.name for p in PROCEDURES.values() if figure in {spec.name for spec in p.figures})
+    owner = next(name for name, one in PROCEDURES.items() if figure in {spec.name for spec in one.figures})
     return f"procedure {owner}"
 
 

@@ -24,7 +24,6 @@ BY_ITSELF = {
     "pipelines/archive/archive.py": "an empty probe whether the archive can be written",
     "pipelines/archive/locks.py": "empty claims, told by their names",
     "pipelines/archive/signatures.py": "a private key is a new file from the start, which nobody else may read",
-    "pipelines/certificates/ledger.py": "entries of an archive that is being made",
     "pipelines/cli/unexpected.py": "a report of a defect, in the state folder",
     "pipelines/doctor/check.py": "a probe, which is removed",
     "pipelines/flows/local.py": "locks and the address of a server",

@@ -104,7 +104,7 @@ def run(tmp_path_factory: pytest.TempPathFactory):
 HALF = """
 from pipelines.procedures.base import *
 class One({bases}):
-    name, title, order, states, source = "one", "One", 1, "s", "s"
+    title, order, states, source = "One", 1, "s", "s"
     roles, part = {roles}, Part
     figures = ({figures})
     def steps(self, part, recipe): return []
@@ -124,7 +124,7 @@ REFUSED = {
 PLAIN = {"bases": "Procedure", "roles": "()", "figures": "", "methods": METHODS}
 
 
-@each([*REFUSED, "no PROCEDURE of this name"])
+@each([*REFUSED, "no PROCEDURE, one is needed"])
 def test_a_procedure_that_is_half_there_is_refused(
     refused: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -22,7 +22,7 @@ from inertial.correction import output_covariance
 from inertial.state import State
 from pipelines.archive import Archive, Run
 from pipelines.chain.runner import Runner
-from pipelines.export import ExportSettings, export_text, unit_calibrations
+from pipelines.export import ExportSettings, export_files, unit_calibrations
 from pipelines.tables.calibration import read_calibration
 
 RATE, GRAVITY_G = 100.0, 9.8123 / 9.80665
@@ -116,8 +116,8 @@ def test_the_arithmetic_is_that_of_the_exported_c(run: Run, home: Path, rng: np.
     _, done = corrected(run, table)
     unit = unit_calibrations(run, ("A1",), failed=True)
     for arithmetic, call, within in (("double", REAL.replace("REAL", "double"), 1e-9), ("q24", FIXED, 1e-6)):
-        header = export_text("c", unit, run.id, ExportSettings(arithmetic=arithmetic))
-        own = compiled(header, call, table[["x", "y", "z", "unit_C"]].to_numpy(), home, "A1")
+        [header] = export_files("c", unit, run.id, ExportSettings(arithmetic=arithmetic)).values()
+        own = compiled(header.decode(), call, table[["x", "y", "z", "unit_C"]].to_numpy(), home, "A1")
         assert np.max(np.abs(own - done[FORCES].to_numpy())) < within
 
 

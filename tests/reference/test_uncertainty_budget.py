@@ -35,8 +35,9 @@ from inertial.uncertainty.period import (
     walk_later,
 )
 from inertial.uncertainty.propagation import fit_design, norm_errors, propagated
-from inertial.uncertainty.risk import lot_risk, outside
+from inertial.uncertainty.risk import lot_risk
 from inertial.uncertainty.rounding import rounded
+from schemas.decisions import outside
 from schemas.uncertainty import formula_gravity
 
 BASE = ("bias", "scale", "misalignment")
@@ -331,7 +332,7 @@ def test_suncals_risks_by_share_in_tolerance_and_ratio() -> None:
 
 def test_specific_risks_and_the_guard_band_of_two_percent() -> None:
     rows = ((485, 275, 1000), (160, 25, 200), (0, 99, 50), (42, 99, 50), (1.0, 0.1, 1.0), (0.8, 0.1, 1.0))
-    risks = [outside(value, u, -limit, limit) for value, u, limit in rows]
+    risks = [outside(value, u, limit) for value, u, limit in rows]
     assert risks == pytest.approx([0.030553, 0.054799, 0.613523, 0.644166, 0.5, 0.022750], abs=6e-7)
 
 

@@ -6,7 +6,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class ArmStretch(CentrifugeEffect):
     """An arm that stretches with the square of the rate: the acceleration is larger than that of the nominal radius."""
 
-    id = "arm_stretch"
     equation = "κ·a·|a|·(r₀/r)"
     source = "mechanism: r = r₀(1 + κω²)"
     unit = "g/g²"

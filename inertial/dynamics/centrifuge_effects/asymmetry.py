@@ -6,7 +6,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class Asymmetry(CentrifugeEffect):
     """A scale that differs between positive and negative acceleration."""
 
-    id = "asymmetry"
     equation = "K1'·|a|"
     source = "IEEE Std 1293, K1'"
     unit = "g/g"

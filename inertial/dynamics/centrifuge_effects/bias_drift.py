@@ -4,7 +4,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class BiasDrift(CentrifugeEffect):
     """A bias that drifts during the test."""
 
-    id = "bias_drift"
     equation = "d·t"
     source = "mechanism: temperature or ageing during the test"
     unit = "g over the test"

@@ -4,7 +4,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class Hysteresis(CentrifugeEffect):
     """An output that differs between rising and falling speed."""
 
-    id = "hysteresis"
     equation = "h·a for falling speed"
     source = "mechanism: the sensing element or the arm returns late"
     unit = "g/g"

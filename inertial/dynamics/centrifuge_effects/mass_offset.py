@@ -6,7 +6,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class MassOffset(CentrifugeEffect):
     """An offset of the proof mass from the turning centre of the mounting: the radius changes when the unit is reversed."""
 
-    id = "mass_offset"
     equation = "(δ/r)·|a|"
     source = "mechanism: r₊ = r + δ, r₋ = r − δ"
     unit = "g/g"

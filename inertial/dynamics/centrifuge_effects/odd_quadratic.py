@@ -6,7 +6,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class OddQuadratic(CentrifugeEffect):
     """An odd quadratic nonlinearity: a quadratic term whose sign follows the acceleration."""
 
-    id = "odd_quadratic"
     equation = "Koq·a·|a|"
     source = "IEEE Std 1293, Koq"
     unit = "g/g²"

@@ -4,7 +4,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class ScaleDrift(CentrifugeEffect):
     """A sensitivity that drifts during the test, as by the heat of windage."""
 
-    id = "scale_drift"
     equation = "s·t·a"
     source = "mechanism: windage heats the units"
     unit = "g/g over the test"

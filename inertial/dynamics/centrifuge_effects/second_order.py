@@ -4,7 +4,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class SecondOrder(CentrifugeEffect):
     """A quadratic nonlinearity of the sensing element."""
 
-    id = "second_order"
     equation = "K2·a²"
     source = "IEEE Std 1293, K2"
     unit = "g/g²"

@@ -4,7 +4,6 @@ from inertial.dynamics.centrifuge_effects.base import Array, CentrifugeEffect, S
 class ThirdOrder(CentrifugeEffect):
     """A cubic nonlinearity of the sensing element."""
 
-    id = "third_order"
     equation = "K3·a³"
     source = "IEEE Std 1293, K3"
     unit = "g/g³"

@@ -6,7 +6,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class Asymmetry(RotationEffect):
     """A scale that differs by the sign of the force."""
 
-    id = "asymmetry"
     equation = "½·K1′·|f|"
     source = "IEEE Std 1293"
     unit = "µg/g"

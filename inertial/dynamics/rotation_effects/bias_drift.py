@@ -6,7 +6,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class BiasDrift(RotationEffect):
     """A bias that drifts during the test."""
 
-    id = "bias_drift"
     equation = "d·t"
     source = "mechanism: temperature or ageing during the test"
     unit = "µg over the test"

@@ -6,7 +6,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class CrossQuadratic(RotationEffect):
     """A response to the product of the forces along an axis and the next one."""
 
-    id = "cross_quadratic"
     equation = "Kip·f·f₊₁"
     source = "mechanism: a pendulous mass that load turns towards the next axis; IEEE Std 1293"
     unit = "µg/g²"

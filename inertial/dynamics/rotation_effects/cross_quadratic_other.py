@@ -6,7 +6,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class CrossQuadraticOther(RotationEffect):
     """A response to the product of the forces along an axis and the one before."""
 
-    id = "cross_quadratic_other"
     equation = "Kio·f·f₋₁"
     source = "mechanism: a pendulous mass that load turns towards the axis before; IEEE Std 1293"
     unit = "µg/g²"

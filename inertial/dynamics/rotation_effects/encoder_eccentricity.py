@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class EncoderEccentricity(RotationEffect):
     """An encoder disc off its centre: the angle is wrong by one wave a turn."""
 
-    id = "encoder_eccentricity"
     equation = "ε·cos(θ + φ)·df/dθ"
     source = "mechanism: eccentric disc"
     unit = "µrad"

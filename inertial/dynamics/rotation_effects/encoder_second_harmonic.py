@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class EncoderSecondHarmonic(RotationEffect):
     """An encoder whose angle is wrong by two waves a turn."""
 
-    id = "encoder_second_harmonic"
     equation = "ε₂·cos(2θ + φ)·df/dθ"
     source = "mechanism: two reading heads, a bent disc"
     unit = "µrad"

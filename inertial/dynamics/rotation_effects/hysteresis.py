@@ -6,7 +6,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class Hysteresis(RotationEffect):
     """An output that lags behind the angle by the same in each direction, whatever the rate."""
 
-    id = "hysteresis"
     equation = "h·sign(ω)·df/dθ"
     source = "mechanism: play of the element or of its suspension"
     unit = "µg/g"

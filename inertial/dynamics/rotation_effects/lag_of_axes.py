@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class LagOfAxes(RotationEffect):
     """Outputs of a device that are late, each by a time of its own."""
 
-    id = "lag_of_axes"
     equation = "−τ·df/dt"
     source = "mechanism: output filter, thermal or viscous lag of the element"
     unit = "ms"

@@ -6,7 +6,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class Level(RotationEffect):
     """A base of the table that is not level."""
 
-    id = "level"
     equation = "Δup in the laboratory's x and y"
     source = "mechanism: levelling"
     unit = "µrad"

@@ -6,7 +6,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class OddQuadratic(RotationEffect):
     """A response that grows with the square of the force and has its sign."""
 
-    id = "odd_quadratic"
     equation = "Koq·f·|f|"
     source = "IEEE Std 1293"
     unit = "µg/g²"

@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class Orthogonality(RotationEffect):
     """Axes of the table that are not at right angles."""
 
-    id = "orthogonality"
     equation = "γ between outer and inner axis"
     source = "mechanism: machining of the table"
     unit = "µrad"

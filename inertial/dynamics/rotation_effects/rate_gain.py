@@ -6,7 +6,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class RateGain(RotationEffect):
     """A gain that changes with the rate of the turn: by the square of the frequency, as the gain of a low pass begins to."""
 
-    id = "rate_gain"
     equation = "g·(ω/ω_max)²·f, ω_max of the fastest turn"
     source = "mechanism: output filter, damping of the element"
     unit = "ppm at the fastest turn"

@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class RunOut(RotationEffect):
     """An axis that leans in its bearing as it turns, twice a turn."""
 
-    id = "run_out"
     equation = "w·cos(2θ + φ) along the standing axis"
     source = "mechanism: oval races, balls of unequal size"
     unit = "µrad"

@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class SampleClock(RotationEffect):
     """Samples by a clock that is not that of the encoder's readings."""
 
-    id = "sample_clock"
     equation = "ε·(t − t₀)·df/dt"
     source = "mechanism: quartz of the reader against that of the station"
     unit = "ppm"

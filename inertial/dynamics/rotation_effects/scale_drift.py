@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class ScaleDrift(RotationEffect):
     """A scale that drifts during the test."""
 
-    id = "scale_drift"
     equation = "s·t·f"
     source = "mechanism: temperature during the test"
     unit = "ppm over the test"

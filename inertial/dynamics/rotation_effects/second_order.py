@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class SecondOrder(RotationEffect):
     """A response of second order along each axis."""
 
-    id = "second_order"
     equation = "K2·f²"
     source = "IEEE Std 1293"
     unit = "µg/g²"

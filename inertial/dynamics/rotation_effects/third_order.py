@@ -4,7 +4,6 @@ from inertial.dynamics.rotation_effects.base import Array, Nodes, RotationEffect
 class ThirdOrder(RotationEffect):
     """A response of third order along each axis."""
 
-    id = "third_order"
     equation = "K3·f³"
     source = "IEEE Std 1293"
     unit = "µg/g³"

@@ -7,7 +7,6 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class AcCoupledReference(ShockEffect):
     """A reference that is AC-coupled: its peak is low and it undershoots after the pulse, with the time constant RC."""
 
-    id = "ac_coupled_reference"
     equation = "u = r + ∫r dt/RC"
     source = "charge amplifier, IEPE sensor: one-pole high-pass"
     unit = "s"

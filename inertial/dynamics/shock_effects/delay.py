@@ -10,7 +10,6 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class Delay(ShockEffect):
     """A delay between the channels: converter, linear-phase filter, time base."""
 
-    id = "delay"
     equation = "u(t) = r(t − τ)"
     source = "time base"
     unit = "s"

@@ -10,7 +10,6 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class FilterOfReference(ShockEffect):
     """A low-pass on the channel of the reference that the unit does not have: filters that do not match."""
 
-    id = "filter_of_reference"
     equation = "two-pole Butterworth at f_c behind the reference"
     source = "SAE J211; equal filters on both channels"
     unit = "Hz"

@@ -7,7 +7,6 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class FilterOfUnit(ShockEffect):
     """A low-pass on the channel of the unit that the reference does not have: filters that do not match."""
 
-    id = "filter_of_unit"
     equation = "two-pole Butterworth at f_c behind the unit"
     source = "SAE J211; equal filters on both channels"
     unit = "Hz"

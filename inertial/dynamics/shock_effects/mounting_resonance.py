@@ -7,7 +7,6 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class MountingResonance(ShockEffect):
     """A resonance of the mounting between the reference and the unit."""
 
-    id = "mounting_resonance"
     equation = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
     source = "sprung mass on its mounting"
     unit = "Hz"

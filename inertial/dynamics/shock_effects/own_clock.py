@@ -8,7 +8,6 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class OwnClock(ShockEffect):
     """A clock of the device that departs from that of the reference: the pulse is stretched."""
 
-    id = "own_clock"
     equation = "u(t) = r(t·(1 + ε))"
     source = "time base"
     unit = "share"

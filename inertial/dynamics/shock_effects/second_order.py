@@ -6,7 +6,6 @@ from inertial.dynamics.shock_effects.base import Array, ShockEffect
 class SecondOrder(ShockEffect):
     """A quadratic nonlinearity of the unit."""
 
-    id = "second_order"
     equation = "K2·r²"
     source = "IEEE Std 1293, K2"
     unit = "g/g²"

@@ -6,7 +6,6 @@ from inertial.dynamics.shock_effects.base import Array, ShockEffect
 class ThirdOrder(ShockEffect):
     """A cubic nonlinearity of the unit, or a range that saturates softly."""
 
-    id = "third_order"
     equation = "K3·r³"
     source = "IEEE Std 1293, K3"
     unit = "g/g³"

@@ -6,7 +6,6 @@ from inertial.dynamics.shock_effects.base import Array, ShockEffect
 class ZeroShift(ShockEffect):
     """A zero of the unit that shifts with the pulse and stays, with one sign for shocks of both directions."""
 
-    id = "zero_shift"
     equation = "z·∫|r|dt, of its final value"
     source = "mechanism: change of stress in the sensing element or its mounting"
     unit = "g"

@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class Amplitude(TransferEffect):
     """A sensitivity that depends on the amplitude: cubic nonlinearity seen by a sine."""
 
-    id = "amplitude"
     equation = "1 + ¾·K3·a²"
     source = "describing function of K3·a³ for a sine of peak a"
     breaker = "one frequency at several levels"

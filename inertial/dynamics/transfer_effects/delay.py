@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class Delay(TransferEffect):
     """A delay that is the same at all frequencies: linear-phase filter, converter, time base."""
 
-    id = "delay"
     equation = "exp(−j2πfτ)"
     source = "time shift of a Fourier transform"
     breaker = "a shared trigger edge on both channels"

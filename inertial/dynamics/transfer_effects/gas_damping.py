@@ -18,7 +18,6 @@ def viscosity(temperature: Array) -> Array:
 class GasDamping(TransferEffect):
     """Damping by a film of gas, which grows with the temperature as the viscosity does."""
 
-    id = "gas_damping"
     equation = "ζ·(1 + c·(μ(T)/μ(25 °C) − 1)), μ ∝ T^1.5/(T + 110.4 K)"
     source = "W. Sutherland, Phil. Mag. 36 (1893) 507; squeeze film of a sealed package: the density of its gas stays"
     breaker = "the same frequencies near the natural one at another temperature"

@@ -16,7 +16,6 @@ def _slipping(pressure: Array, gap_um: Array) -> Array:
 class GasPressure(TransferEffect):
     """Damping by a film of gas that is open to the air: at a lower pressure the molecules slip past the walls."""
 
-    id = "gas_pressure"
     equation = "ζ·q(p)/q(1013 hPa), 1/q = 1 + 9.638·(λ/gap)^1.159, λ = 68 nm·1013 hPa/p"
     source = "T. Veijola et al., Sensors and Actuators A 48 (1995) 239: effective viscosity of a squeeze film"
     breaker = "the same frequencies near the natural one at another pressure"

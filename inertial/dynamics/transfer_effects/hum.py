@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class Hum(TransferEffect):
     """Mains hum by a cable or ground loop, on the points within the resolution of its lines."""
 
-    id = "hum"
     equation = "1 + c/level at 50 or 60 Hz and harmonics"
     source = "additive tone in the record of a point"
     breaker = "move the points away from the mains lines; record with the exciter off"

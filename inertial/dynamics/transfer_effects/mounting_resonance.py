@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class MountingResonance(TransferEffect):
     """A resonance of the mounting between the reference and the device."""
 
-    id = "mounting_resonance"
     equation = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
     source = "transmissibility of a base-excited mass; ISO 5348"
     breaker = "another torque, adhesive or fixture"

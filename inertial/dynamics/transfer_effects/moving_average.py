@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class MovingAverage(TransferEffect):
     """A moving average of length T, as of a decimating filter: linear phase."""
 
-    id = "moving_average"
     equation = "sinc(fT)·exp(−jπfT)"
     source = "boxcar filter; −3 dB at 0.443/T, delay T/2"
     breaker = "points up to the first null at 1/T"

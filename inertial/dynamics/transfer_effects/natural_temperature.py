@@ -10,7 +10,6 @@ LEAST_K = 10.0
 class NaturalTemperature(TransferEffect):
     """A spring that softens or stiffens with temperature, and the natural frequency with it."""
 
-    id = "natural_temperature"
     equation = "f_n·(1 + k·(T − 25 °C))"
     source = "temperature coefficient of Young's modulus: −60 to −70 ppm/K of silicon, half of it in the frequency"
     breaker = "the same frequencies near the natural one at another temperature"

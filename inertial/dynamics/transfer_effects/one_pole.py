@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class OnePole(TransferEffect):
     """A one-pole low-pass behind the sensing element: RC filter of the output."""
 
-    id = "one_pole"
     equation = "1/(1 + jf/f_c)"
     source = "first-order low-pass"
     breaker = "points beyond the corner, or the step response"

@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class OwnClock(TransferEffect):
     """A clock of the device that departs from the reference, where the fit was made at the given frequency."""
 
-    id = "own_clock"
     equation = "sinc(ε·f·T)"
     source = "sine fit at a wrong frequency, IEEE Std 1057"
     breaker = "fit the frequency too, or share a clock or sync edge"

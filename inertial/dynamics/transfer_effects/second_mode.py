@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class SecondMode(TransferEffect):
     """A second mode: a resonance of fixture or case that adds to the motion of the sensing element."""
 
-    id = "second_mode"
     equation = "1 + a·r²/(1 − r² + 2jζr), r = f/f_2"
     source = "modal superposition; ISO 7626-1"
     breaker = "turn the unit about its axis, or move it on the fixture"

@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class SecondOrder(TransferEffect):
     """A sprung mass: second-order response of the sensing element."""
 
-    id = "second_order"
     equation = "1/(1 − r² + 2jζr), r = f/f_n"
     source = "IEEE Std 1293, annex on the dynamic model"
     breaker = "points beyond the natural frequency"

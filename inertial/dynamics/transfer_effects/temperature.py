@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class Temperature(TransferEffect):
     """A sensitivity that follows the temperature during the sweep."""
 
-    id = "temperature"
     equation = "1 + kT·(T − mean T)"
     source = "thermal coefficient of sensitivity"
     breaker = "the same frequencies at another temperature"

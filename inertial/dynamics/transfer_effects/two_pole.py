@@ -6,7 +6,6 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class TwoPole(TransferEffect):
     """A two-pole Butterworth low-pass behind the sensing element."""
 
-    id = "two_pole"
     equation = "1/(1 − r² + j√2·r), r = f/f_c"
     source = "Butterworth low-pass of order 2"
     breaker = "points beyond the corner, or the step response"

@@ -1,4 +1,4 @@
-"""The export formats: each module of this package with a NAME and a ``write`` is a format, and is discovered here."""
+"""The export formats: each module of this package is a format of its name, and is discovered here."""
 
 import re
 from collections.abc import Sequence
@@ -18,7 +18,6 @@ class Format(Protocol):
     unit; COMPLETE where it names effects that have no polynomial; FEWER_AXES where it holds devices with one axis or two
     """
 
-    NAME: str
     SUFFIX: str | tuple[str, ...]
 
     def write(
@@ -28,8 +27,9 @@ class Format(Protocol):
         ...
 
 
-_MODULES = (cast("Format", import_module(f"{__name__}.{info.name}")) for info in iter_modules(__path__))
-FORMATS: dict[str, Format] = {module.NAME: module for module in _MODULES}
+FORMATS: dict[str, Format] = {
+    info.name: cast("Format", import_module(f"{__name__}.{info.name}")) for info in iter_modules(__path__)
+}
 
 
 def export_files(
@@ -65,8 +65,3 @@ def export_files(
                 )
             files[name_of_file] = data if isinstance(data, bytes) else data.encode()
     return files
-
-
-def export_text(name: str, units: Sequence[UnitCalibration], run: str, settings: ExportSettings | None = None) -> str:
-    """The calibrations in a format of text, the files of several units one after another; see :func:`export_files`."""
-    return b"".join(export_files(name, units, run, settings).values()).decode()

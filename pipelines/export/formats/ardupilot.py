@@ -9,7 +9,6 @@ from pipelines.export.parameters import Offsets, bias_m_s2, heading, in_g, numbe
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 
-NAME = "ardupilot"
 SUFFIX = ".param"
 ONE_UNIT = True
 

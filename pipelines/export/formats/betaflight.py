@@ -17,7 +17,6 @@ from pipelines.export.omissions import (
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 
-NAME = "betaflight"
 SUFFIX = ".txt"
 ONE_UNIT = True
 

@@ -16,7 +16,6 @@ from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 from schemas.units import AXES
 
-NAME = "c"
 SUFFIX = ".h"
 FEWER_AXES = True
 

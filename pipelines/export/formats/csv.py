@@ -8,7 +8,6 @@ from pipelines.export.polynomials import ORDER, UnitCalibration
 from pipelines.export.settings import ExportSettings
 from schemas.units import AXES
 
-NAME = "csv"
 SUFFIX = ".csv"
 FEWER_AXES = True
 

@@ -7,7 +7,6 @@ from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 from schemas.units import AXES
 
-NAME = "json"
 SUFFIX = ".json"
 FEWER_AXES = True
 CORRECTION = "a = inverse(sum response[k] θ^k) · (output − sum bias[k] θ^k), θ = T − 25 °C, a in g"

@@ -11,7 +11,6 @@ from pipelines.export.settings import ExportSettings
 from pipelines.export.unit_noise import required_noise
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
-NAME = "kalibr"
 SUFFIX = ".yaml"
 ONE_UNIT = True
 COMPLETE = True  # it holds noise alone; the comments name the calibration that is not in it
@@ -30,7 +29,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
         The run has no static record.
     """
     unit = units[0]
-    noise = required_noise(unit.noise, unit.unit, run, f"format {NAME}")
+    noise = required_noise(unit.noise, unit.unit, run, "format kalibr")
     factor = STANDARD_GRAVITY_M_S2 / MICRO
     rate = settings.rate_hz or noise.rate_hz
     remarks = (

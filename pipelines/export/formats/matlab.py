@@ -13,7 +13,6 @@ from pipelines.export.polynomials import UnitCalibration, refuse_equal_names
 from pipelines.export.settings import ExportSettings
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
 
-NAME = "matlab"
 SUFFIX = ".mat"
 
 _LONGEST_NAME = 31  # of a field that every version reads

@@ -15,7 +15,6 @@ from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 from schemas.units import MICRO
 
-NAME = "polynomial"
 SUFFIX = ".csv"
 FEWER_AXES = True
 COMPLETE = True  # it is fitted to the dwells themselves, and states what it leaves

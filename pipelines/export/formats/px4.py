@@ -9,7 +9,6 @@ from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 
-NAME = "px4"
 SUFFIX = ".params"
 ONE_UNIT = True
 

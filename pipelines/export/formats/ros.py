@@ -11,7 +11,6 @@ from pipelines.export.settings import ExportSettings
 from pipelines.export.unit_noise import required_noise
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
 
-NAME = "ros"
 SUFFIX = ".yaml"
 ONE_UNIT = True
 COMPLETE = True  # it holds noise alone
@@ -31,7 +30,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
         The run has no static record.
     """
     unit = units[0]
-    noise = required_noise(unit.noise, unit.unit, run, f"format {NAME}")
+    noise = required_noise(unit.noise, unit.unit, run, "format ros")
     factor = STANDARD_GRAVITY_M_S2 / MICRO
     rate = settings.rate_hz or noise.rate_hz
     density, walk, flicker = (factor * noise.value[symbol] for symbol in ("N", "K", "B"))

@@ -26,7 +26,6 @@ from pipelines.export.teds import (
 from schemas.errors import WrongUse
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-NAME = "teds"
 SUFFIX = (".teds", ".txt")
 FEWER_AXES = True
 

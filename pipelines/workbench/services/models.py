@@ -12,6 +12,7 @@ from pipelines.diagnosis.inputs import use_written_formulas, with_formulas
 from pipelines.improvement.improvement import with_effects
 from pipelines.jobs.model_files import ModelStep, model_text, new_model, publish_model
 from pipelines.jobs.releases import Release
+from pipelines.jobs.releases import release as publish
 from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import WrongUse, did_you_mean
 
@@ -50,7 +51,6 @@ def release(settings: WorkbenchSettings, name: str, since: str, device: str, sta
     """
     from pipelines.archive import Archive
     from pipelines.jobs.model_change import change_from_options
-    from pipelines.jobs.releases import release as publish
     from pipelines.rerun.selection import moment
 
     with _ALONE, effects.additions_forgotten():

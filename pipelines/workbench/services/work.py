@@ -3,21 +3,23 @@
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.archive import Archive
 from pipelines.audit.finding import AuditFinding
 from pipelines.diagnosis.documents import DiagnosisDocument, VersionDocument
 from pipelines.drawing import Chart
-from pipelines.report.effect_view import EffectView
-from pipelines.report.residual_table import ResidualTable
+from pipelines.report.effect_view import EffectView, effect_views
+from pipelines.report.residual_table import ResidualTable, ladder_of, residual_table, residuals_with
 from schemas.errors import TumblelineError
 from schemas.installed import not_installed
 from schemas.recipe import Recipe
-from schemas.station import StationConfig
+from schemas.station import StationConfig, load_station
 
 ReportProgress = Callable[[int, int, str], None]
 MOST_CHARTS = 6
@@ -81,8 +83,6 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     report_progress(0, steps, "reading the dwells")
     from inertial.quantities import formula_names
     from pipelines.diagnosis.diagnose import default_model, examination
-    from pipelines.report.effect_view import effect_views
-    from pipelines.report.residual_table import ladder_of, residual_table, residuals_with
     from pipelines.tables.condense import condense
     from pipelines.tables.dwell_table import covariates
 
@@ -182,11 +182,8 @@ def recipe_of(request: Mapping[str, Any]) -> tuple[Recipe, Recipe, StationConfig
     TumblelineError
         The recipe, its model or a pose is invalid.
     """
-    from pathlib import Path
-
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
     from pipelines.jobs.releases import planned_recipe
-    from schemas.station import load_station
 
     config = load_station(Path(request["station"]) if request["station"] else None)
     recipe = planned_recipe(request["recipe"], ",".join(request["effects"]), None, request["archive"], config.name)
@@ -207,9 +204,6 @@ def pose_rows(as_it_stands: Recipe, recipe: Recipe) -> list[dict[str, Any]]:
 
 def what_if(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """The effect of a model on the lots of the archive; stored there as evidence for its release."""
-    from pathlib import Path
-
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.selection import selected
     from pipelines.rerun.whatif import evaluated
@@ -223,7 +217,6 @@ def what_if(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
 def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """The document of an audit of the archive, its charts, and the address of every finding with the chart of its evidence."""
     report_progress(0, 2, "reading the runs")
-    from pipelines.archive import Archive
     from pipelines.audit import pictures
     from pipelines.audit.audit import audit, refuse_nothing, scope_of
     from pipelines.audit.document import document, furthest
@@ -263,7 +256,6 @@ def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
 def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """The document of a search over all lots, and its charts."""
     report_progress(0, 2, "scoring new runs")
-    from pipelines.archive import Archive
     from pipelines.discovery import page
     from pipelines.discovery.discover import Look
     from pipelines.discovery.discover import discovered as looked_at

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ledger_events import event
 
-from benchmarks.generated_ledger import write_bulk
+from benchmarks.generated_ledger import write_events
 from pipelines.audit.calibrations import Calibrations, date_of, day_of
 from pipelines.audit.due import Certificates, certificates_of, due, uncertified
 from pipelines.audit.parameters import NAMES
@@ -40,7 +40,7 @@ def known(root: Path, *events: LedgerEntry, captures: dict[str, str] | None = No
     for one in events:
         count[one.serial] = count.get(one.serial, 0) + 1
         own = {**one.__dict__, "sequence": count[one.serial], "when": one.when or f"{one.start}T12:00:00+00:00"}
-        write_bulk(root, [LedgerEntry(**own)])
+        write_events(root, [LedgerEntry(**own)])
     return certificates_of(root, UNTIL, captures or {})
 
 

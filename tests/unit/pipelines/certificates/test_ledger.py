@@ -15,7 +15,7 @@ from in_process import given as asked
 from laboratory import LABORATORY
 from ledger_events import day, event
 
-from benchmarks.generated_ledger import write_bulk
+from benchmarks.generated_ledger import write_events
 from pipelines.archive import Run
 from pipelines.certificates import Ledger, LedgerEntry
 from pipelines.certificates.days import day_of, months_after
@@ -94,11 +94,11 @@ def test_what_is_revoked_holds_on_no_day_or_from_the_day_named_and_needs_a_reaso
 def test_what_was_known_on_a_day_is_told_without_what_was_written_later_by_a_sound_clock(tmp_path: Path) -> None:
     ledger = Ledger(tmp_path)
     first = event(sequence=1, when="2026-01-02T08:00:00+00:00")
-    write_bulk(ledger.root, [first, event(sequence=2, action="revoke", ends=(1,), when="2026-03-01T08:00:00+00:00")])
+    write_events(tmp_path, [first, event(sequence=2, action="revoke", ends=(1,), when="2026-03-01T08:00:00+00:00")])
     assert ledger.valid_at("A1", "2026-02-01") is None
     assert ledger.valid_at("A1", "2026-02-01", known="2026-02-28").certificate == "A1/1"
     later = (datetime.now(UTC) + timedelta(hours=2)).isoformat(timespec="milliseconds")
-    assert write_bulk(ledger.root, [event(f"S{i:02d}", sequence=1, when=later) for i in range(50)]) == 50
+    assert write_events(tmp_path, [event(f"S{i:02d}", sequence=1, when=later) for i in range(50)]) == 50
     assert sorted({one.serial for one in ledger.all()}) == ["A1", *(f"S{i:02d}" for i in range(50))]
     with pytest.raises(ArchiveUnusable, match="set this host's clock"):
         ledger.add(event("S07", **NEXT))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from ledger_events import event
 
-from benchmarks.generated_ledger import write_bulk
+from benchmarks.generated_ledger import write_events
 from pipelines.certificates import Ledger
 from pipelines.certificates import ledger_index as module
 from pipelines.certificates.ledger_index import INDEX_FOLDER, histories_of
@@ -20,8 +20,8 @@ def ledger(tmp_path: Path) -> Ledger:
     evidence = (("coefficients", "1" * 64), ("grades", "2" * 64))
     for number in range(200):
         one = event(serial=f"A{number:03d}", sequence=1, evidence=evidence, when="2026-01-01T00:00:00+00:00")
-        write_bulk(
-            filled.root, [one, replace(one, sequence=2, action="supersede", run="r-2", start="2026-06-01", ends=(1,))]
+        write_events(
+            tmp_path, [one, replace(one, sequence=2, action="supersede", run="r-2", start="2026-06-01", ends=(1,))]
         )
     return filled
 

@@ -24,7 +24,6 @@ from pipelines.export import (
     UnitCalibration,
     device_ids,
     export_files,
-    export_text,
     unit_calibrations,
 )
 from pipelines.export.fixed_point import fixed_point
@@ -32,6 +31,11 @@ from pipelines.export.polynomials import ORDER, effects_left_out
 from pipelines.export.unit_noise import UnitNoise
 from pipelines.importers.readers import matlab as matlab_reader
 from schemas.errors import WrongUse
+
+
+def export_text(name: str, units: list[UnitCalibration], run: str, settings: ExportSettings | None = None) -> str:
+    """The calibrations in a format of text, the files of several units one after another."""
+    return b"".join(export_files(name, units, run, settings).values()).decode()
 
 
 def test_refuses_a_unit_that_is_not_there_an_effect_without_a_place_and_noise_without_a_static_record(
