@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from each import each
-from many_units import many_units
 
+from benchmarks.large_lots import MODEL, many_units
 from inertial.criticism.diagnosis import diagnose
 from inertial.estimation.lot import Lot
 from inertial.state import State
@@ -52,10 +52,6 @@ def test_an_axis_that_rests_in_one_pose_has_its_bias_over_temperature_named(alon
     lot = temperature_test("polynomial", (along,))
     found = diagnose(lot, ("bias", "bias_temperature"), np.random.default_rng(2))
     assert [{"bias_temperature_quadratic"} <= set(named.effects.ids) for named in found.named] == [True]
-
-
-MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
-"""What the units of :func:`many_units` have, and the linear coefficients over the temperature."""
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from long_suites import mostly_slow
 from made_worlds import HIDDEN, NOISES, NULLS, Noise, World, run_of
-from many_units import many_units
 
+from benchmarks.large_lots import many_units
 from inertial.criticism.examination import ExaminedRun
 from inertial.effects import get_all
 from inertial.estimation.force_noise import by_force
