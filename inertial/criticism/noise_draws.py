@@ -95,10 +95,10 @@ class NoiseDraws:
                     self._directions[look, point] = found
                 found = self._directions[look, point]
                 for drop, rank, known in found.drops(along[..., draws]):
-                    after = min(dof[point] - rank, known)
+                    after = dof[point] - rank
                     if rank and after > 0:
                         ratio = (drop / rank) / (np.maximum(total[draws] - drop, 1e-300) / after)
-                        worst[draws] = np.minimum(worst[draws], log_f_tail(ratio, rank, after))
+                        worst[draws] = np.minimum(worst[draws], log_f_tail(ratio, rank, min(after, known)))
         drawn = np.empty(count)
         drawn[order] = worst
         return drawn.reshape(batches, -1)

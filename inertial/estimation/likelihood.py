@@ -116,7 +116,7 @@ class Common:
         chance = min(self.drop, self.rank), min(self.own, rank - self.rank)
         beyond = self.drop - chance[0], self.own - chance[1]
         if deviance <= sum(chance) or sum(beyond) <= 0.0:
-            mean = deviance * self.drop / max(self.drop + self.own, 1e-300)
+            mean = deviance * chance[0] / max(sum(chance), 1e-300)
         else:
             mean = chance[0] + (deviance - sum(chance)) * beyond[0] / sum(beyond)
         return mean, deviance - mean
@@ -253,7 +253,7 @@ def common_at(space: Space, gain: Gain, point: int, total: float = 0.0) -> Commo
 
 def known_together(space: Space) -> float:
     """Degrees of freedom of φ: quantiles have about 0.4 of the information of the mean square of as many values."""
-    return 0.4 * max(space.covariance.axes * space.covariance.there.shape[1] - space.local_rank // len(space.q), 5)
+    return 0.4 * max(space.dof * space.covariance.axes / len(space.q), 5.0)
 
 
 def scatter_beside(richer: Model, term: Term) -> float:
