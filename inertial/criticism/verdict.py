@@ -252,9 +252,7 @@ def _with_a_small_effect(search: EffectSearch, base: Model) -> SearchResult:
     adequate for no other known reason, the small effect is named.
     """
     for rival in search.result.ladder:
-        if isinstance(rival.term.effect, Handling):
-            continue
-        if evident(search.field, judge(search.field, base, rival.term)):
+        if not isinstance(rival.term.effect, Handling) and evident(search.field, judge(search.field, base, rival.term)):
             return replace(search.result, added=(rival.term,), model=base.with_term(rival.term))
     return search.result
 
@@ -293,7 +291,7 @@ def _driver_log_p(model: Model, driver: Driver) -> float:
     richer = model.with_curves(driver.candidate.of_blocks[:, :, 0, :])
     space = model.at(richer.noise)
     gain = space.gain(driver.candidate)
-    return log_p_value(space, float(gain.drop[0]) / shared_noise(model), int(gain.rank[0]))
+    return log_p_value(space, float(gain.drop[0]) / shared_noise(richer), int(gain.rank[0]))
 
 
 def _worth(model: Model, driver: Driver) -> float:

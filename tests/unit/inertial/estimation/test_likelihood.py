@@ -9,7 +9,7 @@ from inertial.criticism.noise_draws import NoiseDraws
 from inertial.effects import get_all
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import Covariance
-from inertial.estimation.likelihood import Common, common_fit, known_together, together, weighed
+from inertial.estimation.likelihood import Common, common_at, common_fit, known_together, together, weighed
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.penalty import price
@@ -20,7 +20,10 @@ from inertial.estimation.space import Space
 
 def blank(units: int, axes: int, n: int, y: np.ndarray, error: np.ndarray | None = None) -> Space:
     """The space of a model without columns, of white noise of variance one."""
-    time, error = np.tile(np.arange(n) * 30.0, (units * axes, 1)), np.ones((units * axes, n)) if error is None else error
+    time, error = (
+        np.tile(np.arange(n) * 30.0, (units * axes, 1)),
+        np.ones((units * axes, n)) if error is None else error,
+    )
     none = np.zeros((units * axes, n, 0))
     return Space(Covariance(time, error, axes=axes), Noise(Shares(), np.ones(units * axes)), y, none, none)
 
@@ -40,7 +43,9 @@ def test_the_common_part_of_a_deviance_rises_with_it(drop: float, own: float) ->
 
 
 @pytest.mark.parametrize(("k", "deviance", "least"), [(3, 40.0, 1.0), (3, 2.0, 1.0), (7, 20.0, 9.0), (7, 0.0, 9.0)])
-def test_a_deviance_less_its_price_is_twice_the_logarithm_of_the_evidence(k: int, deviance: float, least: float) -> None:
+def test_a_deviance_less_its_price_is_twice_the_logarithm_of_the_evidence(
+    k: int, deviance: float, least: float
+) -> None:
     value, largest = np.sqrt(deviance / k), np.sqrt(max(deviance / k, least))
     evidence = k * (stats.norm.logpdf(value, scale=max(largest, 1.0)) - stats.norm.logpdf(value))
     assert deviance - price(deviance, k, least) == pytest.approx(2.0 * evidence, abs=1e-9)
@@ -69,6 +74,23 @@ def test_what_all_units_share_is_fitted_with_missing_dwells_and_units_of_other_n
     gain = space.gain(candidate)
     assert float(gain.common[0]) == pytest.approx(space.rss)
     assert (int(gain.common_rank[0]), int(gain.rank[0])) == (6, 24)
+
+
+@pytest.mark.parametrize("axes", [3, 12])
+def test_the_common_part_of_a_gain_is_the_same_at_noise_that_includes_the_effect(
+    rng: np.random.Generator, axes: int
+) -> None:
+    columns = rng.standard_normal((12, 60, 1, 1))
+    y = rng.standard_normal((12, 60)) + 4.0 * columns[..., 0, 0]
+    parts: list[Common] = []
+    for size in (1.0, 5.0):
+        space = blank(12 // axes, axes, 60, y, size * np.ones((12, 60)))
+        gain = space.gain(Candidate(columns, shared=False))
+        parts.append(common_at(space, gain, 0))
+        if axes == 12:  # of one unit, or of norms, nothing is common
+            np.testing.assert_allclose(gain.common, gain.drop)
+            assert (parts[-1].units, weighed(90.0, 12, 0, common=parts[-1])) == (1, weighed(90.0, 12, 0))
+    assert (parts[1].drop, parts[1].own) == pytest.approx((parts[0].drop, parts[0].own))
 
 
 def test_draws_are_tested_for_what_all_units_share_as_the_data_are() -> None:
