@@ -25,7 +25,9 @@ LARGEST_SEED = 2**63 - 1
 
 
 def unquoted(value: Any, info: ValidationInfo) -> Any:
-    """A value that is no text, which pydantic would take for the number in it; of a command line every value is a text."""
+    """A value without a text, which pydantic would take for the number in it; of a command line every value is a text."""
+    for each in value if isinstance(value, (list, tuple)) else ():
+        unquoted(each, info)
     if isinstance(value, str) and info.mode == "python":
         raise ValueError("a text, a number without quotes is needed; correct it")
     return value

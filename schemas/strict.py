@@ -1,14 +1,20 @@
 """The bases of the parts of a file that is written by hand."""
 
 from collections.abc import Iterable
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, field_validator, model_serializer
 from pydantic_core.core_schema import SerializerFunctionWrapHandler
 
 from schemas.bounds import unquoted
 
-NUMBERS: tuple[Any, ...] = (int, float, int | None, float | None)
+
+def _of_numbers(kind: Any) -> bool:
+    """Whether a kind of value is a number, or several or none; not where its text is read, as a time of day, "06:00"."""
+    parts = get_args(kind)
+    if get_origin(kind) is Annotated:
+        return BeforeValidator not in map(type, parts[1:]) and _of_numbers(parts[0])
+    return all(map(_of_numbers, parts)) if parts else kind in (int, float, type(None), ...)
 
 
 def refuse_repeated(values: Iterable[object], where: str, remedy: str) -> None:
@@ -28,8 +34,7 @@ class Strict(BaseModel):
     @classmethod
     def _unquoted(cls, value: Any, info: Any) -> Any:
         about = cls.model_fields[info.field_name]
-        reads = BeforeValidator in map(type, about.metadata)  # as a time of day, "06:00"
-        return unquoted(value, info) if about.annotation in NUMBERS and not reads else value
+        return unquoted(value, info) if _of_numbers(Annotated[about.annotation, *about.metadata, None]) else value
 
 
 class Grown(Strict):

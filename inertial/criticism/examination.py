@@ -213,7 +213,7 @@ def mended(run: ExaminedRun) -> EffectSearch:
             part.base.problem.forget()
             part.base.forget()
             result = search(fields, base, part.imitates, start=searched.added)
-            searched, of = replace(result, ladder=searched.ladder), fields
+            searched, of = replace(result, ladder=searched.ladder) if searched.added else result, fields
         if part.field is not fields:
             base.forget()
         if not searched.handling or len(run.handled) >= _MENDED:

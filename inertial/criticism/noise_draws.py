@@ -93,12 +93,11 @@ class NoiseDraws:
                         spaces[point] = self.model.at(Noise(self._shares(point), self.model.noise.scale))
                     found = Directions.of(spaces[point], candidate, together=several(self.model))
                     self._directions[look, point] = found
-                found = self._directions[look, point]
-                for drop, rank, known in found.drops(along[..., draws]):
-                    after = min(dof[point] - rank, known)
+                for drop, rank, known in self._directions[look, point].drops(along[..., draws]):
+                    after = dof[point] - rank
                     if rank and after > 0:
                         ratio = (drop / rank) / (np.maximum(total[draws] - drop, 1e-300) / after)
-                        worst[draws] = np.minimum(worst[draws], log_f_tail(ratio, rank, after))
+                        worst[draws] = np.minimum(worst[draws], log_f_tail(ratio, rank, min(after, known)))
         drawn = np.empty(count)
         drawn[order] = worst
         return drawn.reshape(batches, -1)

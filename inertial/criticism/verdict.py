@@ -14,7 +14,7 @@ from inertial.criticism.drivers import Driver, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, Named, examined
 from inertial.criticism.lot_part import LotPart
-from inertial.criticism.search import SearchResult, contest, convincing, evident, judge
+from inertial.criticism.search import SearchResult, convincing, evident, judge
 from inertial.criticism.unknown import Unexplained, better_curve, curve_in_noise, unexplained_by
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
@@ -249,15 +249,10 @@ def _with_a_small_effect(search: EffectSearch, base: Model) -> SearchResult:
     """A search that found nothing, with the best evident effect below the smallest size that matters, if there is one.
 
     In an adequate model, or beside a larger effect, a small effect may result from an inaccurate driver. Where the model is not
-    adequate for no other known reason, the small effect is named. The units of a large lot show it together.
+    adequate for no other known reason, the small effect is named.
     """
-    ladder = search.result.ladder
-    if search.part.field is not search.field and not ladder:
-        ladder = contest(search.field, base)
-    for rival in ladder:
-        if isinstance(rival.term.effect, Handling):
-            continue
-        if evident(search.field, judge(search.field, base, rival.term)):
+    for rival in search.result.ladder:
+        if not isinstance(rival.term.effect, Handling) and evident(search.field, judge(search.field, base, rival.term)):
             return replace(search.result, added=(rival.term,), model=base.with_term(rival.term))
     return search.result
 
@@ -296,7 +291,7 @@ def _driver_log_p(model: Model, driver: Driver) -> float:
     richer = model.with_curves(driver.candidate.of_blocks[:, :, 0, :])
     space = model.at(richer.noise)
     gain = space.gain(driver.candidate)
-    return log_p_value(space, float(gain.drop[0]) / shared_noise(model), int(gain.rank[0]))
+    return log_p_value(space, float(gain.drop[0]) / shared_noise(richer), int(gain.rank[0]))
 
 
 def _worth(model: Model, driver: Driver) -> float:

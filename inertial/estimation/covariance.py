@@ -66,7 +66,7 @@ class Covariance:
     error : (blocks, n), white standard error of each dwell, g; infinite where a dwell is missing
     direction : (blocks, n, 3), unit vectors of the force where the measurement is its norm; None where it is one axis' output
     loudness : (n,), standard deviation of the noise of each dwell over the lot's; None where it is the same in all
-    axes : number of blocks of a unit
+    axes : number of blocks of a unit, whose coefficients units have in common; of all units where only the norm is known
     """
 
     def __init__(

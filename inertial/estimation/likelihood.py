@@ -94,7 +94,7 @@ class Common:
     """What of a reduction of the deviance is common to all units.
 
     share : 0 … 1, common part of the reduction by coefficients of the lot
-    drop, own : reductions of the sum of squares by coefficients by axis that all units share, and by what is of each unit
+    drop, own : reductions of chi-square by coefficients by axis that all units share, and by what is of each unit
     rank : number of the coefficients that all units share; units : number of units with coefficients of their own, 1 if none
     noise : φ, which divides the common part; known : degrees of freedom of φ
     """
@@ -116,7 +116,7 @@ class Common:
         chance = min(self.drop, self.rank), min(self.own, rank - self.rank)
         beyond = self.drop - chance[0], self.own - chance[1]
         if deviance <= sum(chance) or sum(beyond) <= 0.0:
-            mean = deviance * self.drop / max(self.drop + self.own, 1e-300)
+            mean = deviance * chance[0] / max(sum(chance), 1e-300)
         else:
             mean = chance[0] + (deviance - sum(chance)) * beyond[0] / sum(beyond)
         return mean, deviance - mean
@@ -245,15 +245,16 @@ def common_part(space: Space, term: Term, problem: Problem, gain: Gain, total: f
 def common_at(space: Space, gain: Gain, point: int, total: float = 0.0) -> Common:
     """The common part of a gain of coefficients of units, at a point of its grid, or of a larger ``total``."""
     common = max(float(gain.common[point]), 0.0)
-    own = max(float(gain.drop[point]), total) - common
-    units = max(len(gain.by_block) // space.covariance.axes, 1)
-    known = known_together(space)
-    return Common(drop=common, own=max(own, 0.0), rank=int(gain.common_rank[point]), units=units, known=known)
+    total = max(float(gain.drop[point]), total, common)
+    # over the noise beside the term, of which that of the model without it may be a multiple
+    noise = max(space.rss - total, 1e-12 * space.rss, 1e-300) / max(space.dof - int(gain.rank[point]), 1)
+    rank, units = int(gain.common_rank[point]), max(len(gain.by_block) // space.covariance.axes, 1)
+    return Common(0.0, common / noise, (total - common) / noise, rank, units, known=known_together(space))
 
 
 def known_together(space: Space) -> float:
     """Degrees of freedom of φ: quantiles have about 0.4 of the information of the mean square of as many values."""
-    return 0.4 * max(space.covariance.axes * space.covariance.there.shape[1] - space.local_rank // len(space.q), 5)
+    return 0.4 * max(space.dof * space.covariance.axes / len(space.q), 5.0)
 
 
 def scatter_beside(richer: Model, term: Term) -> float:
@@ -285,20 +286,17 @@ def shared_factor(model: Model, term: Term) -> float:
     ----------
     model : with the term in it; its residual is the noise
     """
-    problem = model.problem
-    units = problem.lot.state.time.shape[0]
-    if units < 2 or problem.lot.radial:
+    if not several(model):
         return 1.0
-    together = correlation_of_units(model)
+    units, together = model.problem.lot.state.time.shape[0], correlation_of_units(model)
     return 1.0 + (units - 1) * together * (1.0 if term.shared else _correlation_of_term(model, term, units))
 
 
 def correlation_of_units(model: Model) -> float:
     """Correlation of the residuals of different units on the same axis; zero if not significant or for a single unit."""
-    problem = model.problem
-    units = problem.lot.state.time.shape[0]
-    if units < 2 or problem.lot.radial:
+    if not several(model):
         return 0.0
+    problem, units = model.problem, model.problem.lot.state.time.shape[0]
     left = np.nan_to_num(residuals(problem, model.terms, np.ones(problem.n, dtype=bool)) / problem.error)
     correlation = _mean_correlation(left.reshape(units, -1))
     chance = 1.0 / np.sqrt(left.size / units * units * (units - 1) / 2.0)

@@ -88,8 +88,8 @@ class Problem:
     def covariance(self) -> Covariance:
         """The noise covariances of the blocks."""
         time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, len(self.axes), axis=0)
-        direction = self._direction if self.lot.radial else None
-        return Covariance(time, self.error, direction, self.lot.loudness, self.per_unit)
+        direction, together = (self._direction, self.blocks) if self.lot.radial else (None, self.per_unit)
+        return Covariance(time, self.error, direction, self.lot.loudness, together)
 
     def forget(self) -> None:
         """Drop the stored columns and products; they are computed again when needed."""

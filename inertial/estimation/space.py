@@ -148,8 +148,7 @@ class Space:
         """Whitened residuals, (blocks, n)."""
         if self.targets.shape[-1] == 1:
             return self.targets[..., 0]
-        beta = np.linalg.lstsq(self.gram[1:, 1:], self.gram[1:, 0], rcond=None)[0]
-        return self.targets[..., 0] - self.targets[..., 1:] @ beta
+        return self.targets[..., 0] - self.targets[..., 1:] @ self.shared_sizes
 
     @property
     def shared_sizes(self) -> Array:
@@ -218,8 +217,8 @@ class Space:
         size = np.where(size > 0.0, size, 1.0)
         values, vectors = eigen(found.left / (size[..., :, None] * size[..., None, :]))
         along = np.swapaxes(vectors, -1, -2) @ (found.inside / size[..., None])
-        common = self._common(found)
-        return self._gain_along(along * inverse_roots(values, SEEN**2)[..., None], values > SEEN**2, common)
+        along *= inverse_roots(values, SEEN**2)[..., None]
+        return self._gain_along(along, values > SEEN**2, self._common(found))
 
     def gain_of_dwells(self, columns: Array, dwells: Places) -> Gain:
         """Gain of columns that change a single dwell, for each of some dwells; all blocks share the coefficients.

@@ -147,6 +147,7 @@ def test_a_check_against_the_archive_accepts_it_and_a_changed_digit_or_table_is_
     folder, run = certified
     words = ("--archive", folder / "archive", "--laboratory", folder / "laboratory.toml")
     assert "accepted" in text_of("verify", folder / "out" / "SF-1_1.xml", *words)
+    assert document_of("verify", *words[:2])["findings"] == []
     text = (folder / "out" / "SF-1_1.xml").read_text("utf-8")
     results = Archive(folder / "archive").run(run).path / "procedure_results"
     digest = hashlib.sha256(results.with_suffix(".parquet").read_bytes()).hexdigest()

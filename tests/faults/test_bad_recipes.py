@@ -9,11 +9,13 @@ from root_process import ROOT
 from pipelines.archive import files as archive_files
 from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.seating import Seating, scan
+from pipelines.procedures import parts_of
 from schemas.errors import ArchiveUnusable, RecipeInvalid
 from schemas.model import ModelFile
 from schemas.toml_files import parse_as, parse_toml
 
 RECIPE = ROOT / "schemas" / "samples" / "production.toml"
+LAST = 'limits = "production"\n'
 
 
 @each(
@@ -23,6 +25,8 @@ RECIPE = ROOT / "schemas" / "samples" / "production.toml"
         ("dwell_s = 10.0", "dwell_s = true", "true and false are not numbers"),
         ("dwell_s = 10.0", 'dwell_s = "10"', "'dwell_s': found '10': a text, a number without quotes is needed"),
         ("seed = 1", 'seed = "1"', "'seed': found '1': a text, a number without quotes is needed"),
+        (LAST, LAST + '[[procedures]]\nkind = "bias_stability"\npose_deg = ["1", 0]\n', "'pose_deg': a text, a number"),
+        (LAST, LAST + '[[procedures]]\nkind = "exposure"\nlow_C = "1"\n', "'low_C': found '1': a text"),
         ("dwell_s = 10.0", "dwell_s = -10.0", "'dwell_s': found -10"),
         ("settle_s = 2.0", "settle_s = 1e300", "'settle_s': found 1e\\+300"),
         ("settle_s = 2.0", "settle_s = 1e6", "days, at most 366 are possible"),
@@ -39,14 +43,14 @@ RECIPE = ROOT / "schemas" / "samples" / "production.toml"
         ("seed = 1", f"seed.{'a.' * 3000}b = 1", "deep in one another|nested too deeply"),
         ("[[35.0, 15.0]", "[[1e200, 15.0]", "verification"),
     ],
-    lambda row: row[1][:60],
+    lambda row: row[1][-60:],
 )  # fmt: skip
 def test_recipes_beyond_all_bounds_are_refused_with_their_key(row: tuple[str, str, str], tmp_path: Path) -> None:
     (old, new, words), text = row, RECIPE.read_text()
     assert old in text
     (tmp_path / "r.toml").write_text(text.replace(old, new, 1))
     with pytest.raises(RecipeInvalid, match=words) as refused:
-        load_recipe(str(tmp_path / "r.toml"))
+        parts_of(load_recipe(str(tmp_path / "r.toml")))
     assert len(str(refused.value)) < 700
 
 

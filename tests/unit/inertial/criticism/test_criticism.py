@@ -107,7 +107,7 @@ UNITS = 4
 PLAIN = [Term(catalogue.get(name)) for name in ("bias", "scale", "misalignment")]
 
 
-@pytest.mark.parametrize("seed", mostly_slow(range(3), 0))
+@pytest.mark.parametrize("seed", mostly_slow(range(3), 1))
 def test_cubic_and_quintic_at_faces_and_edges_are_equal_beside_a_table_that_rests_anew(seed: int) -> None:
     """Components of 0, ±√½ and ±1: beside a scale x³ and x⁵ are one column, and the data cannot prefer either."""
     rng = np.random.default_rng([seed, 18])

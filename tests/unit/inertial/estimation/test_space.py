@@ -15,7 +15,8 @@ SHARES = Shares(10.0 ** (4 / 8), 10.0 ** (8 / 8))
 
 
 def covariance(rng: np.random.Generator) -> Covariance:
-    return Covariance(np.tile(np.arange(N) * 30.0, (BLOCKS, 1)), 1e-5 * np.ones((BLOCKS, N)) * rng.uniform(0.95, 1.05))
+    error = 1e-5 * np.ones((BLOCKS, N)) * rng.uniform(0.95, 1.05)
+    return Covariance(np.tile(np.arange(N) * 30.0, (BLOCKS, 1)), error, axes=3)
 
 
 @pytest.mark.parametrize("rows", [[0] * BLOCKS, [0, 1, 2] * 2, [0, 0, 0, 1, 1, 1]])
@@ -32,7 +33,7 @@ def spaces(rng: np.random.Generator) -> Space:
     """Blocks with missing dwells and two levels of noise, a column that all share."""
     error = 1e-5 * np.repeat([1.0, 3.0], BLOCKS // 2)[:, None] * np.ones((BLOCKS, N))
     error[1, 7], error[4, 30:33] = np.inf, np.inf
-    whole = Covariance(np.tile(np.arange(N) * 30.0, (BLOCKS, 1)), error)
+    whole = Covariance(np.tile(np.arange(N) * 30.0, (BLOCKS, 1)), error, axes=3)
     local = np.stack([np.ones((BLOCKS, N)), rng.standard_normal((BLOCKS, N))], axis=-1)
     noise = Noise(SHARES, rng.uniform(0.8, 1.2, BLOCKS))
     return Space(whole, noise, rng.standard_normal((BLOCKS, N)), local, rng.standard_normal((BLOCKS, N, 1)))
@@ -72,7 +73,13 @@ def test_the_gain_of_each_block_is_what_it_loses_itself_beside_columns_that_all_
         before = y - z * float(np.sum(z * y) / np.sum(z**2))
         expected = np.sum(before**2, axis=1) - np.sum(left**2, axis=1)
         np.testing.assert_allclose(found.by_block[:, g], expected, rtol=1e-6, atol=1e-6)
+        # with coefficients by axis that both units share, beside the shared column as it is
+        by_axis = whole[:, :, g].reshape(2, 3, N, 2).swapaxes(0, 1).reshape(3, 2 * N, 2)
+        both = before.reshape(2, 3, N).swapaxes(0, 1).reshape(3, 2 * N)
+        left = [v - x @ np.linalg.lstsq(x, v, rcond=None)[0] for x, v in zip(by_axis, both, strict=True)]
+        assert float(found.common[g]) == pytest.approx(np.sum(before**2) - np.sum(np.square(left)), rel=1e-6)
     np.testing.assert_allclose(found.by_block.sum(axis=0), found.drop, rtol=1e-6)
+    assert np.all(found.common <= found.drop)
 
 
 def test_a_deleted_dwell_deviates_as_the_inverse_of_the_covariance_says(rng: np.random.Generator) -> None:
@@ -94,20 +101,25 @@ def test_what_a_candidate_takes_off_draws_is_what_least_squares_takes_off(rng: n
     space = Space(covariance(rng), noise, rng.standard_normal((BLOCKS, N)), local, np.zeros((BLOCKS, N, 0)))
     columns = rng.standard_normal((BLOCKS, N, 4, p))
     columns[2, :, 1, 0] = 3.0 * local[2, :, 1]  # the model has it already
-    draws = space.project(rng.standard_normal((BLOCKS, N, 7)))
+    draws = np.concatenate([space.residual[..., None], space.project(rng.standard_normal((BLOCKS, N, 6)))], axis=-1)
     candidate = Candidate(columns, shared=False)
-    found = Directions.of(space, candidate)
-    drops = found.drops(times_rows(space.backed(draws), candidate))
-    for g, (drop, rank, _) in enumerate(drops):
+    found, gain = Directions.of(space, candidate, together=True), space.gain(candidate)
+    drops = list(found.drops(times_rows(space.backed(draws), candidate)))
+    # with coefficients of each block, and by axis of both units together
+    groups = [*([[b] for b in range(BLOCKS)],) * 4, *([[axis, axis + 3] for axis in range(3)],) * 4]
+    for g, ((drop, rank, _), group) in enumerate(zip(drops, groups, strict=True)):
         expected, seen = np.zeros(7), 0
-        white = space.whiten(columns[:, :, g])
-        left = space.project(white) / np.linalg.norm(white, axis=1)[:, None]
-        for b in range(BLOCKS):
-            u, s, _ = np.linalg.svd(left[b], full_matrices=False)
-            expected += np.sum((u[:, s > SEEN].T @ draws[b]) ** 2, axis=0)
+        white = space.whiten(columns[:, :, g % 4])
+        for some in group:
+            white_some = white[some].reshape(-1, p)
+            left = space.project(white[some], np.array(some)).reshape(-1, p) / np.linalg.norm(white_some, axis=0)
+            u, s, _ = np.linalg.svd(left, full_matrices=False)
+            expected += np.sum((u[:, s > SEEN].T @ draws[some].reshape(-1, 7)) ** 2, axis=0)
             seen += int(np.sum(s > SEEN))
         assert rank == seen
         np.testing.assert_allclose(drop, expected, rtol=1e-9)
+    np.testing.assert_allclose(np.append(gain.drop, gain.common), [drop[0] for drop, _, _ in drops], rtol=1e-9)
+    assert [*gain.rank.tolist(), *gain.common_rank.tolist()] == [rank for _, rank, _ in drops]
 
 
 def test_drawn_noise_is_white_again_after_the_whitener(rng: np.random.Generator) -> None:
