@@ -57,6 +57,7 @@ SHORT: dict[str, str] = {
     "scoreboard": "--seed 1 --share 0.1 --only hand",
     "hand_turned": "friction --runs 2",
     "line": "--lots 4 --most 2",
+    "large_lots": "--runs 1 --sizes 1",
 }
 
 
