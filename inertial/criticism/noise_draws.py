@@ -227,11 +227,9 @@ class Directions:
         """Reductions (draws,) of sums of squares, rank and degrees of freedom, from products (blocks, grid, p, draws)."""
         for turn, ranks, known in self.parts:
             onto = _summed(along, len(turn))
-            if turn.shape[-1] == 1:
-                drops = np.einsum("bg,bgd->gd", turn[..., 0, 0] ** 2, onto[..., 0, :] ** 2)
-            else:
-                turned = turn @ onto
-                drops = np.einsum("bgpd,bgpd->gd", turned, turned)
+            # multiplied before they are squared: the squares of nearly vanishing columns overflow
+            turned = turn * onto if turn.shape[-1] == 1 else turn @ onto
+            drops = np.einsum("bgpd,bgpd->gd", turned, turned)
             yield from ((drop, rank, known) for drop, rank in zip(drops, ranks.tolist(), strict=True))
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from many_units import many_units
 from scipy import stats
 
+from benchmarks.large_lots import many_units
 from inertial.criticism.noise_draws import NoiseDraws
 from inertial.effects import get_all
 from inertial.estimation.candidate import Candidate
