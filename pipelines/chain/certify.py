@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from inertial.counts import number_of
 from pipelines.archive import Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
@@ -119,8 +118,8 @@ def certify(  # noqa: PLR0913 - each is an option of the command
                 (result.there if was_there else result.written).append(event)
             ledger.anchor([*result.written, *ledger.unanchored(result.there)])
         except ArchiveUnusable as problem:  # a disk that became full
-            entered = f"{len(result.events)} of {number_of(len(proposals), 'unit')} are in the ledger"
-            raise ArchiveUnusable(f"{problem}; certify: {entered}; give the same command again to go on") from None
+            entered = f"units in the ledger: {len(result.events)} of {len(proposals)}"
+            raise ArchiveUnusable(f"{problem}; {entered}; give the same command again to go on") from None
     return result
 
 

@@ -79,7 +79,7 @@ def test_a_disk_that_becomes_full_leaves_units_out_that_the_same_command_adds(
         patch.setattr(files, "_write_durably", written)
         told = str(typed("certificate", "issue", "--reason", "first").exception)
     assert "No space left" in told
-    assert told.endswith("certify: 2 of 3 units are in the ledger; give the same command again to go on")
+    assert told.endswith("; units in the ledger: 2 of 3; give the same command again to go on")
     done = json.loads(typed("certificate", "issue", "--reason", "first", "--json").stdout)["certified"]
     assert {(one["certificate"], one["was_there"]) for one in done} == {("A1/1", True), ("A2/1", True), ("A3/1", False)}
     assert not Ledger(run.archive).unanchored([one.event for one in Ledger(run.archive).all()])
