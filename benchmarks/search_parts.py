@@ -78,14 +78,6 @@ def contested(world: World, seed: int) -> Counts:
     return _named(world, [r for r in contest(field, model) if convincing(field, model, r)])
 
 
-def leads(world: World, seed: int) -> Counts:
-    """Lots in which what is hidden is the best rival of the first step."""
-    from inertial.criticism.search import contest
-
-    found = contest(*candidates(world, seed))
-    return int(bool(found) and found[0].term.effect.id == world.hidden[0][0]), 1
-
-
 def material(world: World, seed: int) -> Counts:
     """The same, of rivals that are known."""
     from inertial.criticism.search import convincing
@@ -119,13 +111,6 @@ SEARCH_PARTS: dict[str, Part] = {
     ),
     **dict.fromkeys(("LESS_WALK", "LESS_FLICKER"), (contested, {**_SLOW, "null_K4": NULLS["K4"]})),
     "MATERIAL": (material, {**_SLOW, "third_order_1": HIDDEN["third_order_1"], "null_K4": NULLS["K4"]}),
-    "SPREAD": (
-        leads,
-        {
-            **{name: HIDDEN[name] for name in ("third_order_1", "level_error_1", "level_error_2")},
-            "cubic of half the noise in 40 units": World(units=40, hidden=(("third_order", 0.5),)),
-        },
-    ),
     "TAILS": (
         tails,
         {"t3": NULLS["t3"], "t3, one unit": NULLS["t3_one_unit"], "a dwell off by 0.5 mg": WORLDS["dwell"]},

@@ -106,15 +106,6 @@ Table at rest ± 20 µrad: nothing named in 20 runs, with 8 of 10 without it. `p
 16 such lots, and in 3 of 104 lots of eight units whose noise is their own.
 """
 
-SPREAD = 0.3
-"""Least standard deviation between sensors of one lot, over the mean of the lot, that the price of an effect of sensors expects.
-
-Coefficients that are equal within far less are more probably those of one cause that all units share. `python
-benchmarks/characteristics.py --only SPREAD --runs 8`, at half, at it, at twice as much, what is hidden leads: a cubic of size 1
-in 8, 8, 8 of 8, of half the noise in 40 units in 8, 8, 8, a level error of size 1 in 7, 7, 7, of size 2 in 7, 7, 7: it decides
-only where the columns of a station and of sensors are nearly alike.
-"""
-
 NAMED_BELOW = 3e-3
 """Probability of the chi-square, times the number of tests, below which a finding is reported; in addition to the price.
 

@@ -38,9 +38,9 @@ class Rival:
         """The rival of a term and its likelihood ratio."""
         return Rival(term, ratio.deviance, ratio.rank, -ratio.score, ratio.log_p, ratio)
 
-    def at(self, shared: float) -> "Rival":
-        """The rival judged at another φ."""
-        return self if self.ratio is None else Rival.of(self.term, self.ratio.at(shared))
+    def at(self, ratio: Ratio) -> "Rival":
+        """The rival judged at the φ of another ratio, and at its shares of wander if they are better."""
+        return self if self.ratio is None else Rival.of(self.term, self.ratio.at(ratio.shared, ratio.shares))
 
 
 class Candidates:

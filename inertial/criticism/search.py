@@ -346,16 +346,15 @@ def _initial_states(model: Model, term: Term) -> tuple[Term, ...]:
 
 
 def ranked(rivals: Sequence[Rival]) -> list[Rival]:
-    """Rivals, best first, all judged at the φ of the rival that is best when each has its own φ.
+    """Rivals, best first, all judged at the φ and also at the wander of the rival that is best when each has its own.
 
     Two effects that are identical in the poses of a plan have equal residuals, but φ, estimated from medians, changes their
     deviances by a few per cent: each judged at its own φ, they could fall into different classes.
     """
     ordered = sorted(rivals, key=lambda r: r.cost)
-    if not ordered or ordered[0].ratio is None:
+    if not ordered or (best := ordered[0].ratio) is None:
         return ordered
-    shared = ordered[0].ratio.shared
-    return sorted((r.at(shared) for r in ordered), key=lambda r: r.cost)
+    return sorted((r.at(best) for r in ordered), key=lambda r: r.cost)
 
 
 def _reexamine(

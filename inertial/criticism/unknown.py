@@ -120,8 +120,15 @@ def wide_suspects(problem: Problem) -> list[Driver]:
     return suspected
 
 
-def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -> tuple[CurveFit, list[Term]] | None:
-    """The curve that explains the lot better than chosen effects, and the effects that remain beside it; None if none does."""
+def better_curve(
+    base: Model, chosen: Sequence[Term], field: Sequence[Driver], alike: Sequence[Term] = ()
+) -> tuple[CurveFit, list[Term]] | None:
+    """The curve that explains the lot better than chosen effects, and the effects that remain beside it; None if none does.
+
+    Parameters
+    ----------
+    alike : effects that explain as much as a single chosen one, of which some have fewer coefficients
+    """
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
     full = Model(base.problem, [*base.terms, *chosen], near=base.noise)
     base_cost = cost_of_model(base)
@@ -139,16 +146,16 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
     remaining: list[Term] = []
     if len(chosen) > 1:
         # the first two suspects of the driver: a smooth dependence of the bias, and levels
-        alike = [s for s in field if s.name == suspect.name and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
+        tried = [s for s in field if s.name == suspect.name and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
         worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (base_cost - best.cost))
-        best, remaining = _with_others(base, chosen, alike, best, worth)
+        best, remaining = _with_others(base, chosen, tried, best, worth)
     replaced = [t for t in chosen if t not in remaining]
     ahead = decisions.CURVE_AHEAD / len(replaced) if 0 < len(replaced) < 3 else 0.0
     if not replaced or best.cost + ahead >= _cost_beside(full, best):
         return None  # up to two effects have priority over a curve that is not clearly better
     # an effect with memory is also compared alone: its inexact shape often leaves residuals that further effects explain
     rivals = [t for t in replaced if t.effect.memory or len(replaced) == 1]
-    priority = any(_nearly_as_good(base, [*remaining, t], best) for t in rivals)
+    priority = any(_nearly_as_good(base, [*remaining, t], best) for t in [*rivals, *alike])
     return None if priority else (best, remaining)
 
 

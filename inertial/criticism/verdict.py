@@ -18,7 +18,7 @@ from inertial.criticism.search import SearchResult, convincing, evident, judge
 from inertial.criticism.unknown import Unexplained, better_curve, curve_in_noise, unexplained_by
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
-from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
+from inertial.decisions import ADEQUATE_ABOVE, CLASS_WIDTH, NAMED_BELOW
 from inertial.estimation.alternative import Handling
 from inertial.estimation.bases import SEEN
 from inertial.estimation.comparison import fitted_residuals
@@ -272,7 +272,11 @@ def _curve_in_place_of(
     part: LotPart, base: Model, searched: SearchResult, suspected: Sequence[Driver]
 ) -> tuple[Model, Unexplained] | None:
     """The model without the effects that imitate a curve, and the curve as an unexplained driver; None if there is none."""
-    better = better_curve(part.base, searched.added, suspected) if searched.added else None
+    ladder = searched.ladder if len(searched.added) == 1 else ()
+    alike = [
+        r.term for r in ladder if r.cost < ladder[0].cost + CLASS_WIDTH and not isinstance(r.term.effect, Handling)
+    ]
+    better = better_curve(part.base, searched.added, suspected, alike) if searched.added else None
     if better is None:
         return None
     fit, terms = better

@@ -5,21 +5,22 @@ covariance estimated for it: D = −2[ℓ(V0; H) − ℓ(V1; H, C)], with error 
 the coefficients of the term's columns C at their maximum, and V1 the better of the noises of the model and of the richer model.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from statistics import NormalDist
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from math import gamma
 
 import numpy as np
 
 from inertial.arrays import Array
-from inertial.decisions import SPREAD, TOGETHER, UNITS_TOGETHER
+from inertial.decisions import TOGETHER, UNITS_TOGETHER
 from inertial.design import of_axes
+from inertial.distributions import chi2_quantile
 from inertial.estimation.alternative import Handling, by_block, pose_errors
 from inertial.estimation.bases import SEEN, unit_columns
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.comparison import estimate, residuals
 from inertial.estimation.model import Model
-from inertial.estimation.noise_shares import deviance_of
+from inertial.estimation.noise_shares import Noise, Shares, deviance_of
 from inertial.estimation.penalty import freedom, price
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Gain, Space
@@ -37,7 +38,8 @@ class Ratio:
 
     deviance : D, corrected for the noise that units share; rank : number of coefficients that the plan determines
     price : penalty for these coefficients and for the locations searched; log_p : log probability of D under noise, one test
-    shared : φ of the model with the term, which divides the part of D common to all units; again : the ratio at another φ
+    shared : φ of the model with the term, which divides the part of D common to all units
+    shares : shares of wander at which D is largest; again : the ratio at another φ, with further shares as well
     """
 
     deviance: float
@@ -45,11 +47,16 @@ class Ratio:
     price: float
     log_p: float
     shared: float = 1.0
-    again: Callable[[float], "Ratio"] | None = None
+    shares: Shares = field(default_factory=Shares)
+    again: Callable[[float, Shares], "Ratio"] | None = None
 
-    def at(self, shared: float) -> "Ratio":
-        """The ratio at another φ: rivals are compared at a common φ, because each estimate of φ scatters."""
-        return self if self.again is None else self.again(shared)
+    def at(self, shared: float, shares: Shares) -> "Ratio":
+        """The ratio at another φ, and at given shares if D is larger there.
+
+        Rivals are compared at a common φ, because each estimate of φ scatters, and at the same shares: where few soaks leave the
+        slow noise open, D differs by more between two estimates of it than between two effects.
+        """
+        return self if self.again is None else self.again(shared, shares)
 
     @property
     def score(self) -> float:
@@ -65,7 +72,12 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
     locations : number of locations searched, for handling errors
     """
     richer = model.with_term(term)
-    noises = [model.noise, richer.noise]
+    return _ratio(model, term, locations, [model.noise, richer.noise])
+
+
+def _ratio(model: Model, term: Term, locations: int, noises: Sequence[Noise], shared: float | None = None) -> Ratio:
+    """The likelihood ratio at the best of some noises, and at a given φ or that of the model with the term."""
+    richer = model.with_term(term)
     spaces = [(model.at(noise), richer.at(noise)) for noise in noises]
     full = [restricted_deviance(space, more) for space, more in spaces]
     best = int(np.argmin(full))
@@ -80,13 +92,16 @@ def likelihood_ratio(model: Model, term: Term, locations: int = 1) -> Ratio:
     deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
     common, nonlinear = common_part(space, term, model.problem, gain, space.rss - more.rss), freedom(term)
     scatter = scatter_beside(richer, term)
+    shares = noises[best].shares
 
-    def divided(shared: float) -> Ratio:
-        ratio = weighed(deviance, rank, nonlinear, locations, replace(common, noise=max(shared, scatter)))
-        return replace(ratio, shared=shared, again=divided)
+    def again(shared: float, others: Shares) -> Ratio:
+        if others in [noise.shares for noise in noises]:
+            ratio = weighed(deviance, rank, nonlinear, locations, replace(common, noise=max(shared, scatter)))
+            return replace(ratio, shared=shared, shares=shares, again=again)
+        return _ratio(model, term, locations, [*noises, richer.noise_at(others)], shared)
 
     # φ with the term in the model: an effect common to all units must not count as shared noise
-    return divided(shared_noise(richer))
+    return again(shared_noise(richer) if shared is None else shared, shares)
 
 
 @dataclass(frozen=True)
@@ -126,8 +141,7 @@ def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1, comm
     """The ratio of a deviance with its price and its probability.
 
     Coefficients of units are their mean and the deviations from it, and each of the two has its own price: an effect that all
-    sensors of a design have needs evidence for a few coefficients, whatever the number of units. Sensors are never equal, so
-    that deviations far below :data:`SPREAD` of the mean count against an effect of the sensor.
+    sensors of a design have needs evidence for a few coefficients, whatever the number of units.
 
     Parameters
     ----------
@@ -139,9 +153,8 @@ def weighed(deviance: float, rank: int, nonlinear: int, locations: int = 1, comm
         paid = price(deviance, coefficients) + of_locations
         return Ratio(deviance, rank, paid, float(log_chi2_tail(deviance, coefficients)))
     mean, own = common.parted(deviance, rank)
-    spread = 1.0 + SPREAD**2 * max(mean / common.rank - 1.0, 0.0) / common.units
     mean, of_mean = mean / common.noise, common.rank + nonlinear
-    paid = price(mean, of_mean) + price(own, rank - common.rank, spread) + of_locations
+    paid = price(mean, of_mean) + price(own, rank - common.rank) + of_locations
     log_p = min(log_chi2_tail(mean + own, coefficients), log_f_tail(mean / of_mean, of_mean, common.known))
     return Ratio(mean + own, rank, paid, float(min(log_p + np.log(2.0), 0.0)))
 
@@ -183,14 +196,17 @@ def together(
     if squares.size < _FEWEST_POSES:
         return 1.0
     lost = max(space.dof / max(int(space.covariance.count.sum()), 1), 0.1)
-    largest = 1.0
-    for quantile in quantiles:
-        normal = NormalDist().inv_cdf(0.5 + 0.5 * quantile)
-        phi = float(np.quantile(squares, quantile)) / normal**2 / lost
-        # standard error of a quantile of squares, over the quantile
-        error = np.sqrt(quantile * (1.0 - quantile) / squares.size) / (normal * NormalDist().pdf(normal))
-        largest = max(largest, phi if phi > 1.0 + errors * error else 1.0)
-    return largest
+    return _above_noise(squares / lost, 1, quantiles, errors)
+
+
+def _above_noise(values: Array, dof: int, quantiles: tuple[float, ...] = _QUANTILES, errors: float = TOGETHER) -> float:
+    """The largest ratio of quantiles of values to those of chi-square, as far as it exceeds one by some standard errors."""
+    quantile = np.array(quantiles)
+    expected = chi2_quantile(quantile, dof)
+    ratio = np.quantile(values, quantile) / expected
+    density = 0.5 * (0.5 * expected) ** (0.5 * dof - 1.0) * np.exp(-0.5 * expected) / gamma(0.5 * dof)
+    error = np.sqrt(quantile * (1.0 - quantile) / values.size) / (expected * density)
+    return float(np.max(ratio, where=ratio > 1.0 + errors * error, initial=1.0))
 
 
 def of_station(term: Term) -> bool:
@@ -216,14 +232,7 @@ def scatter_of_poses(model: Model) -> float:
     drop = gain.drop[gain.rank == 2]
     if drop.size < _FEWEST_POSES:
         return 1.0
-    largest = 1.0
-    for quantile in _QUANTILES:
-        expected = -2.0 * np.log1p(-quantile)
-        ratio = float(np.quantile(drop, quantile)) / expected
-        # standard error of a quantile of exponential values, over the quantile
-        error = 2.0 * np.sqrt(quantile / (1.0 - quantile) / drop.size) / expected
-        largest = max(largest, ratio if ratio > 1.0 + TOGETHER * error else 1.0)
-    return float(largest)
+    return _above_noise(drop, 2)
 
 
 def common_part(space: Space, term: Term, problem: Problem, gain: Gain, total: float = 0.0) -> Common:

@@ -14,19 +14,14 @@ PER_COLUMN = 6.0
 """Price, in chi-square, of each coefficient and each column where complete models, also with curves, are compared."""
 
 
-def price(deviance: float, coefficients: float, least: float = 1.0) -> float:
+def price(deviance: float, coefficients: float) -> float:
     """Price of k coefficients that reduce the deviance by D, in chi-square: k·(1 + ln(D/k)), or D where D ≤ k.
 
     For coefficients from a normal distribution of fitted variance, D less this price is twice the log evidence ratio.
-
-    Parameters
-    ----------
-    least : smallest variance of the estimated coefficients, over that of noise alone: D/r + k·ln r where D/k is below this r
     """
-    if coefficients <= 0:
+    if deviance <= coefficients or coefficients <= 0:
         return max(deviance, 0.0)
-    ratio = max(deviance / coefficients, least, 1.0)
-    return max(deviance, 0.0) / ratio + coefficients * float(np.log(ratio))
+    return coefficients * (1.0 + float(np.log(deviance / coefficients)))
 
 
 def fall(space: Space, gain: Gain) -> np.ndarray:
