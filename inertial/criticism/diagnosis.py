@@ -154,7 +154,8 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
     """The classes with the errors before and after each is added, in order, to the model with the classes before it.
 
     Where a class does not reduce the error on dwells left out, the comparison is repeated beside all other classes: a second
-    effect as large as the first can mask what the first predicts.
+    effect as large as the first can mask what the first predicts. Then it is repeated at one noise, that of the richer model: a
+    walk estimated without the effect can follow it from dwell to dwell, but predicts no other run.
     """
     named: list[Named] = []
     model = base
@@ -162,7 +163,7 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
     terms = [(group.physics or group.members)[0].term for group in classes]
     before = left_out(base, also=terms) if classes else None
     for group, first in zip(classes, terms, strict=True):
-        model = model.with_term(first)
+        poorer, model = model, model.with_term(first)
         after = left_out(model, also=terms)
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
         rest = Model(problem, [*base.terms, *(t for t in terms if t is not first)], near=base.noise)
@@ -170,6 +171,9 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
         found = Named(group, left, *errors, carried=carried_by(rest, first))
         if not found.predicts and len(classes) > 1:
             errors = worst(left_out(rest, also=terms), left_out(rest.with_term(first), also=terms))
+            found = replace(found, heldout_before=errors[0], heldout_after=errors[1])
+        if not found.predicts:
+            errors = worst(left_out(poorer.held_at(model.noise.shares), also=terms), after)
             found = replace(found, heldout_before=errors[0], heldout_after=errors[1])
         named.append(found)
         before = after

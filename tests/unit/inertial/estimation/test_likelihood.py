@@ -4,18 +4,27 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from benchmarks.large_lots import many_units
+from benchmarks.large_lots import MODEL, many_units
 from inertial.criticism.noise_draws import NoiseDraws
 from inertial.effects import get_all
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import Covariance
-from inertial.estimation.likelihood import Common, common_at, common_fit, known_together, together, weighed
+from inertial.estimation.likelihood import (
+    Common,
+    common_at,
+    common_fit,
+    known_together,
+    likelihood_ratio,
+    together,
+    weighed,
+)
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.penalty import price
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
 from inertial.estimation.space import Space
+from inertial.estimation.term import Term
 
 
 def blank(units: int, axes: int, n: int, y: np.ndarray, error: np.ndarray | None = None) -> Space:
@@ -102,3 +111,16 @@ def test_draws_are_tested_for_what_all_units_share_as_the_data_are() -> None:
     expected = stats.f.sf(ratio, 3, known_together(model.space))
     assert np.all(own <= 1.001 * expected)
     assert np.mean(np.isclose(own, expected, rtol=1e-3)) > 0.25
+
+
+def test_rivals_are_compared_at_equal_wander_where_few_soaks_leave_it_open() -> None:
+    problem = Problem(many_units(8, 3, "quadratic", 0.7))
+    model = Model(problem, terms_of(get_all(MODEL), problem))
+    quadratic, lag = get_all(("bias_temperature_quadratic", "thermal_lag"))
+    best, rival = (likelihood_ratio(model, term) for term in (Term(quadratic), Term(lag, (("tau", 500.0),))))
+    assert rival.shares.walk > best.shares.walk
+    again = rival.at(best.shared, best.shares)
+    assert (again.shares, again.rank) == (best.shares, rival.rank)
+    assert rival.deviance + 5.0 < again.deviance < best.deviance + price(100.0, rival.rank - best.rank)
+    for shares in (rival.shares, Shares(walk=100.0)):  # its own, and one that explains the lot worse
+        assert rival.at(rival.shared, shares).score == pytest.approx(rival.score)
