@@ -43,12 +43,7 @@ class PlainFit:
     """
 
     def __init__(
-        self,
-        output: Array,
-        force: Array,
-        theta: Array | None,
-        there: Flags,
-        of_other: Callable[[int, int], Array],
+        self, output: Array, force: Array, theta: Array | None, there: Flags, of_other: Callable[[int, int], Array]
     ) -> None:
         units, n = there.shape
         force = np.broadcast_to(force, (units, n, 3))

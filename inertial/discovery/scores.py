@@ -113,10 +113,7 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[list[Array
 
 
 def _scored(
-    model: Model,
-    columns: Sequence[Array],
-    names: tuple[tuple[str, int], ...],
-    station: tuple[tuple[str, int], ...],
+    model: Model, columns: Sequence[Array], names: tuple[tuple[str, int], ...], station: tuple[tuple[str, int], ...]
 ) -> LotScores:
     """Scores of all columns, those of the sensor before those of the station, whitened in one pass."""
     problem, space, even, covariance = model.problem, model.space, model.even, model.problem.covariance

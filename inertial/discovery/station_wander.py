@@ -95,13 +95,7 @@ class Wander:
         return Innovation(_chosen_of(every, self.log_likelihood), every, gain, roots, known)
 
     def beside_driver(
-        self,
-        name: str,
-        station: str,
-        prediction: Array,
-        found: Innovation,
-        rms: Array,
-        told: Flags,
+        self, name: str, station: str, prediction: Array, found: Innovation, rms: Array, told: Flags
     ) -> tuple[Array, Array]:
         """Innovation of a lot, and innovation of a driver's prediction in the same filter, (h,) each; updates the state.
 

@@ -230,9 +230,12 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
 TOO_GOOD_P = 1e-3
 """Probability of so small a χ² below which the stated uncertainties are told to be too large."""
 
+_IN_ORDER = 0.3
+"""Correlation of neighbouring residuals, two standard deviations for the points of a sweep, from which they have an order."""
+
 
 def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") -> list[tuple[str, str]]:
-    """Subject and text of the figures of a model with U (k = 2), of its polarity, and of uncertainties that are too large.
+    """Subject and text of the figures of a model with U (k = 2), of its polarity, and of uncertainties too large or small.
 
     output : unit of the output, where it is stated
     """
@@ -240,8 +243,7 @@ def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") 
     if diagnosis.adequate is None:
         return out
     values = figures_of_model("z", diagnosis, points, "sweep")
-    names = ("bandwidth", WORD["natural_hz"], WORD["damping"])
-    units = (" Hz", " Hz", "")
+    names, units = ("bandwidth", WORD["natural_hz"], WORD["damping"]), (" Hz", " Hz", "")
     known = [
         f"{name} {with_uncertainty(figure.value, 2.0 * figure.uncertainty)}{unit}"
         for name, unit, figure in zip(names, units, values, strict=True)
@@ -265,6 +267,14 @@ def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") 
             "points share; U of the figures is too large by as much"
         )
         out.append(("uncertainties", text))
+    elif diagnosis.unexplained and not diagnosis.alone_hz:
+        left = fit.residual.reshape(2, -1)[:, np.argsort(points.conditions.frequency)]  # magnitudes and phases
+        # of independent errors the steps from point to point have twice the squares of the errors
+        if np.sum(np.diff(left) ** 2) > 2.0 * (1.0 - _IN_ORDER) * np.sum(left**2):
+            text = (
+                f"the points scatter by {share:.2g} times the stated uncertainties, in no order: these may be too small"
+            )
+            out.append(("uncertainties", text))
     return out
 
 

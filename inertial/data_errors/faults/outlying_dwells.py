@@ -19,9 +19,8 @@ def outliers(readings: Readings) -> Iterator[Fault]:
     for unit, row in enumerate(np.asarray(out)):
         dwells = np.flatnonzero(row)
         if 0 < dwells.size <= 0.1 * row.size:
-            yield Fault(
-                "spikes", unit, tuple(dwells.tolist()), f"{number_of(dwells.size, 'dwell')} far from the others"
-            )
+            evidence = f"{number_of(dwells.size, 'dwell')} far from the others"
+            yield Fault("spikes", unit, tuple(dwells.tolist()), evidence)
 
 
 LOOK = Look(outliers, ("spikes",), order=120)

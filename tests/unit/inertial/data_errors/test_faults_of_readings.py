@@ -32,15 +32,9 @@ def readings(
     output = gain * (felt @ np.swapaxes(response, 1, 2)) + rng.normal(0.0, 0.03, (units, 1, 3)) + run
     size = np.resize(sensitivity, units)[:, None, None]
     output = size * (output + rng.normal(0.0, 30e-6, output.shape))
-    count = np.full(warm.shape, 50.0)
-    return Readings(
-        force=np.repeat(force[None], units, axis=0),
-        output=output,
-        time=np.tile(60.0 * np.arange(len(force)), (units, 1)),
-        spread=np.full(output.shape, 2e-4) * size * rng.uniform(0.9, 1.1, output.shape),
-        count=count,
-        temperature=warm,
-    )
+    spread = np.full(output.shape, 2e-4) * size * rng.uniform(0.9, 1.1, output.shape)
+    time, count = np.tile(60.0 * np.arange(len(force)), (units, 1)), np.full(warm.shape, 50.0)
+    return Readings(np.repeat(force[None], units, axis=0), output, time, spread, count=count, temperature=warm)
 
 
 @pytest.mark.parametrize("units", [1, 3])
@@ -57,6 +51,15 @@ def test_one_unit_of_another_range_is_told_and_a_lot_of_several_ranges_has_no_od
     assert [(fault.name, fault.unit) for fault in odd] == [("wrong_range", 3)]
     assert not find_faults(readings(rng, units=6, sensitivity=(1.0, 0.5, 16.0)))
     assert not find_faults(readings(rng, units=4, sensitivity=(1.0, 0.0625)))
+
+
+def test_a_thermometer_in_another_unit_is_told_by_the_others_and_a_gain_of_a_tenth_is_none() -> None:
+    lot = readings(np.random.default_rng(9), units=4)
+    assert lot.temperature is not None
+    for gain, offset, found in ((1.8, 32.0, [("wrong_units", 2)]), (1.1, 3.0, [])):
+        warm = lot.temperature.copy()
+        warm[2] = gain * warm[2] + offset
+        assert [(fault.name, fault.unit) for fault in find_faults(replace(lot, temperature=warm))] == found
 
 
 def test_a_dwell_whose_samples_are_one_code_is_stuck_only_where_the_code_is_not_that_of_its_pose() -> None:
@@ -91,5 +94,4 @@ def test_dwells_that_no_other_unit_has_are_no_end_of_a_file() -> None:
     parts = replace(
         two, output=np.where(missing[..., None], np.nan, two.output), time=np.where(missing, np.nan, two.time)
     )
-    assert [fault.name for fault in find_faults(parts) if fault.unit == 0] == []
-    assert [fault.name for fault in find_faults(parts) if fault.unit == 1] == ["truncated_file"]
+    assert [(fault.name, fault.unit) for fault in find_faults(parts)] == [("truncated_file", 1)]

@@ -194,9 +194,9 @@ def test_a_delay_beside_a_filter_that_may_be_absent_is_never_longer_than_both(tm
     assert delay["high"] < 42e-6
 
 
-def test_uncertainties_that_are_too_large_are_told_and_fail_nothing(tmp_path: Path) -> None:
-    text = text_of(*sweep(tmp_path, OWN, form="u", scatter=0.3), status=0)
-    assert "uncertainties: the scatter is 0.3" in text
+def test_uncertainties_that_are_too_large_are_told_and_fail_nothing_and_too_small_ones_are_told(tmp_path: Path) -> None:
+    assert "uncertainties: the scatter is 0.3" in text_of(*sweep(tmp_path, OWN, form="u", scatter=0.3), status=0)
+    assert "stated uncertainties, in no order" in text_of(*sweep(tmp_path, OWN, form="u", scatter=10.0), status=1)
 
 
 @pytest.mark.parametrize(
