@@ -13,6 +13,7 @@ from inertial.criticism.curves import CurveFit
 from inertial.criticism.drivers import Driver, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, Named, examined
+from inertial.criticism.field import Rival
 from inertial.criticism.lot_part import LotPart
 from inertial.criticism.search import SearchResult, convincing, evident, judge
 from inertial.criticism.unknown import Unexplained, better_curve, curve_in_noise, unexplained_by
@@ -272,15 +273,18 @@ def _curve_in_place_of(
     part: LotPart, base: Model, searched: SearchResult, suspected: Sequence[Driver]
 ) -> tuple[Model, Unexplained] | None:
     """The model without the effects that imitate a curve, and the curve as an unexplained driver; None if there is none."""
-    ladder = searched.ladder if len(searched.added) == 1 else ()
-    alike = [
-        r.term for r in ladder if r.cost < ladder[0].cost + CLASS_WIDTH and not isinstance(r.term.effect, Handling)
-    ]
+    alike = [] if len(searched.added) != 1 else _as_good_as_the_best(searched.ladder)
     better = better_curve(part.base, searched.added, suspected, alike) if searched.added else None
     if better is None:
         return None
     fit, terms = better
     return Model(base.problem, [*base.terms, *terms]), unexplained_by(part.base, fit, len(suspected))
+
+
+def _as_good_as_the_best(ladder: Sequence[Rival]) -> list[Term]:
+    """The effects of a step of the search that the data do not separate from its best rival."""
+    near = [rival.term for rival in ladder if rival.cost < ladder[0].cost + CLASS_WIDTH]
+    return [term for term in near if not isinstance(term.effect, Handling)]
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:

@@ -13,9 +13,6 @@ from inertial.uncertainty.rounding import chance, short, short_values
 from pipelines.diagnosis import sentences
 from pipelines.diagnosis.documents import DiagnosisDocument, EffectClassDocument, NextMeasurement
 
-HIDDEN, SHOWN = 3.0, 4
-"""Factor by which slow noise must raise the smallest detectable size of an effect to list it, and the number of effects
-listed."""
 DRIVERS = 8
 """Drivers of the residual that a terminal lists."""
 
@@ -184,11 +181,9 @@ def unseen_in_part(document: DiagnosisDocument) -> Section:
 
 def hidden_by_noise(document: DiagnosisDocument) -> Section:
     """Effects whose smallest detectable size 1/f noise or random walk raises most, with the measurement for smaller sizes."""
-    named = document.get("smallest_named", ())
-    raised = [row for row in named if row["size_ug"] > HIDDEN * row["without_slow_noise_ug"]][:SHOWN]
     rows = [
         [r["effect"], short(r["size_ug"], 2), short(r["without_slow_noise_ug"], 2), effects.get(r["effect"]).breaker]
-        for r in raised
+        for r in sentences.hidden(document)
     ]
     numbers = ("smallest size", "µg rms"), ("with white noise only", "µg rms")
     columns = ("effect", *numbers, "measurement for smaller sizes")
@@ -201,7 +196,7 @@ def worded(document: DiagnosisDocument) -> dict[str, Any]:
         "verdict": sentences.verdict(document),
         "cards": sentences.cards(document),
         "evidence": sentences.evidence_text(document),
-        "undetected": sentences.undetected(document),
+        "undetected": "; ".join(filter(None, (sentences.undetected(document), sentences.slow_noise(document)))),
         "faults": faults(document),
         "drivers": drivers(document, None),
         "missing": missing(document),

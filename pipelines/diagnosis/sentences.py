@@ -8,11 +8,14 @@ from inertial.counts import degrees_of_freedom, number_of
 from inertial.criticism.evidence import FEW_DOF
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.uncertainty.rounding import chance, equal, short
-from pipelines.diagnosis.documents import DiagnosisDocument, EffectClassDocument, NextMeasurement
+from pipelines.diagnosis.documents import DiagnosisDocument, EffectClassDocument, NextMeasurement, SmallestNamed
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 
 BAD_DWELL = "bad_dwell"
 _NOT_RECORDED = re.compile(r"the dwells carry no (\w+):")
+HIDDEN, SHOWN = 3.0, 4
+"""Factor by which slow noise must raise the smallest detectable size of an effect to list it, and the number of effects
+listed."""
 NAMED_DWELLS = 5
 """Number of dwells named in a sentence."""
 
@@ -125,6 +128,25 @@ def undetected(document: DiagnosisDocument) -> str:
     few = "few dwells: " if few_dwells(document) else ""
     size = f"is detected from {short(smallest)} µg/g³ on, with a probability of one half"
     return f"{few}a cubic term {'of any size is not detected' if smallest is None else size}"
+
+
+def hidden(document: DiagnosisDocument) -> list[SmallestNamed]:
+    """The effects whose smallest detectable size slow noise (1/f, random walk) raises most."""
+    named = document.get("smallest_named", ())
+    return [row for row in named if row["size_ug"] > HIDDEN * row["without_slow_noise_ug"]][:SHOWN]
+
+
+def slow_noise(document: DiagnosisDocument) -> str:
+    """What an adequate model may lack where slow noise explains most of the residual; empty elsewhere."""
+    floor, white = document["error"]["floor_ug"], document["error"].get("white_noise_ug")
+    rows = hidden(document)
+    if not document["adequate"] or not rows or floor is None or white is None or floor <= 2**0.5 * white:
+        return ""
+    sizes = ", ".join(f"{row['effect']} ({short(row['size_ug'], 2)} µg)" for row in rows)
+    return (
+        f"white noise is {short(white)} µg, the rest counts as slow noise, which hides effects smaller than {sizes}; "
+        "a second run shows what comes again"
+    )
 
 
 def influences(document: DiagnosisDocument, most: int | None = NAMED_DWELLS) -> list[str]:

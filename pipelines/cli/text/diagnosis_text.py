@@ -37,6 +37,7 @@ def print_diagnosis(
         _dim(sentences.evidence_text(document))
     if sentences.few_dwells(document):
         _dim(sentences.undetected(document))
+    _dim(sentences.slow_noise(document))
     print_section(sections.faults(document))
     _picture(made)
     print_findings(document, brief=brief)

@@ -6,13 +6,14 @@ import pytest
 from each import each
 from scipy.spatial.transform import Rotation
 
+from benchmarks import hand_turned
 from benchmarks.made_recordings import NOISES, Recording, make
 from inertial.fits.ellipsoid import fit_ellipsoid
 from inertial.norm_fit import fit_norms
 from inertial.probability import passes
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.sections import parameters_of
-from pipelines.diagnosis.sentences import verdict
+from pipelines.diagnosis.sentences import slow_noise, verdict
 from pipelines.stages.unknown_poses.fit import norms_fitted
 from pipelines.tables.dwells import measured
 from pipelines.tables.leave_out import leave_out
@@ -73,11 +74,17 @@ def test_samples_of_a_movement_are_not_judged_and_name_nothing() -> None:
 
 
 def test_what_the_verdict_rests_on_stands_beside_it() -> None:
-    few, many = (diagnose(make(Recording(n), 8).dwells)["evidence"] for n in (26, 120))
+    documents = [diagnose(make(Recording(n), 8).dwells) for n in (26, 120)]
+    few, many = (document["evidence"] for document in documents)
+    assert [slow_noise(document) for document in documents] == ["", ""]
     assert (few["degrees_of_freedom"], many["degrees_of_freedom"]) == (17, 111)
     assert few["bias_jackknife_ug"] > many["bias_jackknife_ug"] > 0.0
     assert few["smallest_cubic_ug"] is None or few["smallest_cubic_ug"] > 2.0 * many["smallest_cubic_ug"]
     assert many["smallest_cubic_ug"] < 500.0
+    # a warm-up that 39 dwells do not separate from a walk: adequate, and what the walk may hide is said
+    hidden = slow_noise(diagnose(hand_turned.make("warm_up", 1, 1.5)))
+    assert hidden.startswith("white noise is 24.9 µg, the rest counts as slow noise")
+    assert "warm_up (1" in hidden
     assert few["condition"] > 1.0
 
 
