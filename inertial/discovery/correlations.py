@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.arrays import NORMAL_MEDIAN, Array
+from inertial.arrays import NORMAL_MEDIAN, Array, over
 from inertial.discovery.running_sums import FIRST, Scale, Sums
-from inertial.discovery.station_wander import over
 
 
 @dataclass(frozen=True)

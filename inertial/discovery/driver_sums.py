@@ -3,58 +3,41 @@
 import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
-from inertial.arrays import NORMAL_MEDIAN, Array
-from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
-from inertial.discovery.station_wander import over
+from inertial.arrays import NORMAL_MEDIAN, Array, over
+from inertial.discovery.evidence import MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
+from inertial.discovery.running_sums import Levels
 
 INSIDE_ONLY = {SLOT, UNIT}
 """Drivers that are judged only by differences within a lot."""
 
 
-@dataclass
-class DriverSums:
-    """Sums of a driver by level, in units of the noise of the lots.
+class DriverSums(Levels):
+    """Sums of a driver by level, in units of the noise of the lots; the level of a number is its slope.
 
-    levels : score and information, (2, h), by label ("slope" or "all" for a driver without levels)
-    units : number of units of each level · about : origin from which a numerical driver is counted
+    units : number of units of each level · about : origin from which a number is counted
     inside, between : information from differences within lots, and from the means of lots
     """
 
-    levels: dict[str, Array] = field(default_factory=dict[str, Array])
-    units: Counter[str] = field(default_factory=Counter[str])
-    about: float = 0.0
-    inside: float = 0.0
-    between: float = 0.0
+    def __init__(self, count: int, about: float) -> None:
+        super().__init__(count)
+        self.units, self.about, self.inside, self.between = Counter[str](), about, 0.0, 0.0
 
     @property
     def labels(self) -> list[str]:
         """Names of the g levels."""
-        return list(self.levels)
-
-    @cached_property
-    def score(self) -> Array:
-        """Scores (g, h) of the levels; read after the last lot was added."""
-        return np.stack([score for score, _ in self.levels.values()])
-
-    @cached_property
-    def information(self) -> Array:
-        """Information (g, h) of the levels; read after the last lot was added."""
-        return np.stack([information for _, information in self.levels.values()])
+        return list(self.place)
 
     @property
     def mixed(self) -> bool:
         """Whether most information comes from differences within lots, so that the columns' products within lots apply."""
         return self.inside > self.between
 
-    def add(self, label: str, score: Array, information: Array, units: int) -> None:
+    def add_units(self, label: str, score: Array, information: Array, units: int) -> None:
         """Add scores and information (h,) of some units to a level."""
-        self.levels.setdefault(label, np.zeros((2, score.size)))
-        self.levels[label] += score, information
+        self.add((label,), score[None], information[None])
         self.units[label] += units
 
 
@@ -62,21 +45,16 @@ def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, Dri
     """Sums of drivers over lots, from differences between and within lots together, by driver."""
     means = _station_means(lots)
     noise, within = _noise(lots, means)
-    out = {name: DriverSums() for name in drivers}
-    about = {name: _mean_number(lots, name) for name in drivers}
+    out = {name: DriverSums(lots[0].information.size, _mean_number(lots, name)) for name in drivers}
     seen = Counter(unit for lot in lots for unit in lot.units) if UNIT in out else Counter[str]()
     for lot in lots:
-        _gather(lot, out, means[lot.station], (noise, within), about, seen)
-    return {name: sums for name, sums in out.items() if sums.levels}
+        _gather(lot, out, means[lot.station], (noise, within), seen)
+    return {name: sums for name, sums in out.items() if sums.labels}
 
 
 def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
     """Mean of a numerical driver over the lots that have it; zero if none has."""
-    values = [
-        lot.day if name == DATE else float(lot.numbers[name].mean())
-        for lot in lots
-        if name == DATE or name in lot.numbers
-    ]
+    values = [float(numbers.mean()) for lot in lots if (numbers := lot.number(name)) is not None]
     return float(np.nanmean(values)) if values else 0.0
 
 
@@ -88,19 +66,13 @@ def shrinkage(size: Array, information: Array) -> Array:
 
 def weights_of(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
     """Weight of each level in each unit, (units, levels): 1 or 0, or a numerical driver's value about its origin."""
-    units = len(lot.units)
-    out = np.zeros((units, len(sums.labels)))
-    if driver == MEAN:
-        out[:] = 1.0
-    elif driver == DATE or driver in lot.numbers:
-        numbers = np.full(units, lot.day) if driver == DATE else lot.numbers[driver]
-        out[:, 0] = np.where(np.isfinite(numbers), numbers - sums.about, 0.0)
-    else:
-        labels = (lot.station,) * units if driver == STATION else lot.levels.get(driver, ())
-        column = {label: k for k, label in enumerate(sums.labels)}
-        for unit, label in enumerate(labels):
-            if label in column:
-                out[unit, column[label]] = 1.0
+    numbers = lot.number(driver)
+    if numbers is not None:
+        return np.where(np.isfinite(numbers), numbers - sums.about, 0.0)[:, None]
+    out = np.zeros((len(lot.units), len(sums.labels)))
+    for unit, label in enumerate(lot.labels(driver)):
+        if label in sums.place:
+            out[unit, sums.place[label]] = 1.0
     return out
 
 
@@ -108,19 +80,16 @@ def about_common(driver: str, sums: DriverSums) -> Array:
     """Scores (g, h) of levels; for a driver judged within lots only, about the mean over all levels."""
     if driver not in INSIDE_ONLY or len(sums.labels) < 2:
         return sums.score
-    total = sums.information.sum(axis=0)
-    mean = sums.score.sum(axis=0) / np.where(total > 0.0, total, 1.0)
-    return sums.score - sums.information * mean
+    return sums.score - sums.information * over(sums.score.sum(axis=0), sums.information.sum(axis=0))
 
 
 def _station_means(lots: Sequence[ScoredLot]) -> dict[str, Array]:
     """Mean size (h,) over each station's lots, by station."""
-    score, info = dict[str, Array](), dict[str, Array]()
+    sums = dict[str, Array]()
     for lot in lots:
-        zero = np.zeros(lot.information.size)
-        score[lot.station] = score.get(lot.station, zero) + np.where(lot.information > 0.0, lot.score.sum(axis=0), 0.0)
-        info[lot.station] = info.get(lot.station, zero) + lot.information
-    return {station: score[station] / np.where(info[station] > 0.0, info[station], 1.0) for station in score}
+        of_lot = np.stack([np.where(lot.information > 0.0, lot.score.sum(axis=0), 0.0), lot.information])
+        sums[lot.station] = sums.get(lot.station, np.zeros_like(of_lot)) + of_lot
+    return {station: over(*of_station) for station, of_station in sums.items()}
 
 
 def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float, float]:
@@ -143,7 +112,6 @@ def _gather(
     out: Mapping[str, DriverSums],
     mean: Array,
     scale: tuple[float, float],
-    about: Mapping[str, float],
     seen: Mapping[str, int],
 ) -> None:
     """Add a lot to the sums of drivers; ``scale``: as of :func:`_noise`, ``seen``: lots of each unit, which must be several."""
@@ -152,16 +120,12 @@ def _gather(
     sums = np.where(info > 0.0, lot.score.sum(axis=0), 0.0)
     units = len(lot.units)
     for name, of in out.items():
-        if name == MEAN:
-            of.add("all", sums / noise, info / noise, units)
-        elif name == STATION:
-            of.add(lot.station, sums / noise, info / noise, units)
-        elif name == DATE or name in lot.numbers:
-            numbers = np.full(units, lot.day) if name == DATE else lot.numbers[name]
-            of.about = about[name]
-            _gather_number(of, numbers - about[name], (lot, left, mean, noise, within))
-        elif name == UNIT or name in lot.levels:
-            labels = lot.units if name == UNIT else lot.levels[name]
+        labels, numbers = lot.labels(name), lot.number(name)
+        if numbers is not None:
+            _gather_number(of, numbers - of.about, (lot, left, mean, noise, within))
+        elif name in {MEAN, STATION}:
+            of.add_units(labels[0], sums / noise, info / noise, units)
+        else:
             for label in dict.fromkeys(labels):
                 here = np.array([other == label for other in labels])
                 of_level = by_unit[here].sum(axis=0)
@@ -175,7 +139,7 @@ def _gather(
                     information = information + common
                     of.between += float(common.sum())
                 if label and (name != UNIT or seen[label] > 1):
-                    of.add(label, score, information, int(here.sum()))
+                    of.add_units(label, score, information, int(here.sum()))
 
 
 def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array, Array, float, float]) -> None:
@@ -188,4 +152,4 @@ def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array
     score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
     inside, between = (about**2 * by_unit).sum(axis=0) / within, centre**2 * lot.information / noise
     of.inside, of.between = of.inside + float(inside.sum()), of.between + float(between.sum())
-    of.add("slope", score, inside + between, len(lot.units))
+    of.add_units(SLOPE, score, inside + between, len(lot.units))

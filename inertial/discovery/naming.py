@@ -13,12 +13,12 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from inertial import effects as effects_catalogue
-from inertial.arrays import Array, Places
+from inertial.arrays import Array, Places, over
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import INSIDE_ONLY, DriverSums, about_common, gathered, shrinkage, weights_of
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
 from inertial.discovery.pose_shape import SHAPE
-from inertial.discovery.station_wander import over
+from inertial.discovery.scores import Products, correlations_of
 
 _MOST = 6
 """Largest number of names of one evaluation."""
@@ -63,6 +63,27 @@ class Name:
     errors: Array
     score: float
 
+    def by_axis(self) -> list[float]:
+        """Rms size of each axis over the levels, g, corrected for noise."""
+        weight, _, squares = self._squares()
+        return np.sqrt(np.maximum((weight * squares).sum(axis=0), 0.0)).tolist()
+
+    def size(self) -> tuple[float, float, float]:
+        """Rms size over levels and axes, and the ends of its 95 % interval, g."""
+        weight, errors, squares = self._squares()
+        each = weight / 3.0
+        mean = float((each * squares).sum())
+        spread = 2.0 * float(np.sqrt((each**2 * (4.0 * self.sizes**2 * errors**2 + 2.0 * errors**4)).sum()))
+        size, low, high = np.sqrt(np.maximum([mean, mean - spread, mean + spread], 0.0)).tolist()
+        return size, low, high
+
+    def _squares(self) -> tuple[Array, Array, Array]:
+        """Weights of the levels (n, 1); standard errors (zero if unknown), g, and squares less noise, g², of the sizes."""
+        finite = np.isfinite(self.errors)
+        errors = np.where(finite, self.errors, 0.0)
+        weight = self.weights / max(float(self.weights.sum()), 1e-300)
+        return weight[:, None], errors, np.where(finite, self.sizes**2 - errors**2, 0.0)
+
 
 @dataclass(frozen=True)
 class Unnamed:
@@ -80,19 +101,11 @@ class Unnamed:
 
 
 class Pool:
-    """All lots of an archive, gathered for some drivers.
+    """All lots of an archive, gathered for some drivers; hypotheses are axes × columns."""
 
-    Parameters
-    ----------
-    columns : (k,), effect and index of its column; hypotheses are axes × columns
-    size : (h,), g, rms in a dwell of a coefficient of one
-    lot : (h, h), products of the columns for sums over a lot's units · inside : (axes, k, k), for differences within a lot
-    """
-
-    def __init__(self, columns: Sequence[tuple[str, int]], size: Array, lot: Array, inside: Array) -> None:
-        self.columns, self.size = tuple(columns), size
-        self.lot, self.inside = _correlation(lot), _correlation(inside)
-        self.axes = len(inside)
+    def __init__(self, products: Products) -> None:
+        self.columns, self.size, self.axes = products.columns, products.size, len(products.inside)
+        self.lot, self.inside = correlations_of(products.lot), correlations_of(products.inside)
 
     def names(
         self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float
@@ -169,7 +182,7 @@ class Pool:
 
     def _fitted(self, driver: str, effect: str, sums: DriverSums) -> tuple[Array, Array]:
         """Sizes (axes, levels, p) of an effect's columns, fitted jointly per level, and covariances (axes, levels, p, p)."""
-        here, centred = self._everywhere(effect), about_common(driver, sums)
+        here, centred = self.everywhere(effect), about_common(driver, sums)
         inner = self._inner(sums, effect)
         root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
         scale = over(np.ones_like(root), root)
@@ -199,7 +212,7 @@ class Pool:
         for name in found:
             inexact = effects_catalogue.get(name.effects[0]).nonlinear
             little = new.score < (_REMAINDER_OF_SHAPE if inexact else _REMAINDER) * name.score
-            cosines = self.lot[np.ix_(self._everywhere(effect), self._everywhere(name.effects[0]))]
+            cosines = self.lot[np.ix_(self.everywhere(effect), self.everywhere(name.effects[0]))]
             alike = set(new.effects) & set(name.effects) or np.abs(cosines).max() > _ALIKE
             if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):
                 return True
@@ -301,7 +314,7 @@ class Pool:
         if not weights.any():
             return lot
         score = lot.score.copy()
-        root, everywhere = np.sqrt(np.maximum(lot.information, 0.0)), self._everywhere(effect)
+        root, everywhere = np.sqrt(np.maximum(lot.information, 0.0)), self.everywhere(effect)
         in_common: list[Array] = []
         for axis in range(self.axes):
             here, every = axis * count + at, axis * count + np.arange(count)
@@ -322,7 +335,7 @@ class Pool:
         for axis in range(self.axes):
             every = axis * count + np.arange(count)
             left[:, every], by_unit[:, every] = _eliminated(left[:, every], by_unit[:, every], self.inside[axis], at)
-        of_sums = _eliminated(sums[None], information[None], self.lot, self._everywhere(effect))
+        of_sums = _eliminated(sums[None], information[None], self.lot, self.everywhere(effect))
         sums, information = (part[0] for part in of_sums)
         score = np.where(by_unit > 0.0, left + share * sums, 0.0)
         return replace(lot, score=score, own=by_unit, information=information)
@@ -331,7 +344,7 @@ class Pool:
         """Indices of the columns of an effect, (p,)."""
         return np.array([k for k, (name, _) in enumerate(self.columns) if name == effect], dtype=np.intp)
 
-    def _everywhere(self, effect: str) -> Places:
+    def everywhere(self, effect: str) -> Places:
         """Indices of the hypotheses of an effect, (axes·p,), axis by axis."""
         return (np.arange(self.axes)[:, None] * len(self.columns) + self.places(effect)).reshape(-1)
 
@@ -341,7 +354,7 @@ class Pool:
         Combinations that vanish beside errors of the station, or by rounding of the stored sums, are excluded: otherwise a large
         effect would seem to explain three times the actual chi-square.
         """
-        at, here = self.places(effect), self._everywhere(effect)
+        at, here = self.places(effect), self.everywhere(effect)
         if sums.mixed:
             among = np.asarray(block_diag(*self.inside[:, at[:, None], at]), dtype=np.float64)
         else:
@@ -359,7 +372,7 @@ class Pool:
 
     def _drop(self, name: str, sums: DriverSums, effect: str) -> tuple[float, Array]:
         """Reduction of chi-square by an effect's columns, and the number of coefficients of each hypothesis."""
-        here = self._everywhere(effect)
+        here = self.everywhere(effect)
         info = sums.information[:, here]
         z = over(about_common(name, sums)[:, here], np.sqrt(np.maximum(info, 0.0)))
         return float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
@@ -383,7 +396,7 @@ class Pool:
             np.where(info > 0.0, over(np.ones_like(info), np.sqrt(np.maximum(info, 0.0))), np.inf) * self.size[here]
         )
         weights = np.array(list(sums.units.values()), dtype=np.float64)
-        return Name(tuple(effects), tuple(drivers), tuple(sums.levels), weights, sizes, errors, top)
+        return Name(tuple(effects), tuple(drivers), tuple(sums.labels), weights, sizes, errors, top)
 
 
 def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], needed: float) -> set[int]:
@@ -418,9 +431,3 @@ def _eliminated(values: Array, information: Array, products: Array, at: Places) 
 def _of_units(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
     """Sizes (units, h) that the sums of a driver predict for the units of a lot."""
     return weights_of(lot, driver, sums) @ over(about_common(driver, sums), sums.information)
-
-
-def _correlation(products: Array) -> Array:
-    """Products (..., k, k) normalised to a unit diagonal; zero where the diagonal is zero."""
-    root = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 0.0))
-    return over(products, root[..., :, None] * root[..., None, :])

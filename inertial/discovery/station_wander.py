@@ -7,11 +7,13 @@ passed through the same filter.
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from inertial.arrays import Array, Flags
+from inertial.arrays import Array, Flags, over
 
 WALKS: Array = np.array([0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0])
 """Variance of the walk from one lot of a station to the next, over that of the noise of a lot."""
@@ -20,7 +22,6 @@ WALK_FROM = 2.0
 """Gain of log likelihood from which on stations have a random walk; a value constant within a lot may then be station wander."""
 
 _LARGEST = 5.0
-_BETWEEN = "\x1f"  # separator of the names of a driver and of a station, which may contain any printable character
 
 
 @dataclass
@@ -61,7 +62,7 @@ class Wander:
         self.stations: dict[str, Level] = {}
         self.log_likelihood: Array = np.zeros((WALKS.size, count))
         self.beside: dict[str, Array] = {}  # log likelihood with the prediction of each driver in the model
-        self._scale, self._lots = np.zeros(count), np.zeros(count)
+        self._lots = np.zeros((2, count))  # Σ of the noise variance of the lots, and their number
 
     @property
     def gained(self) -> Array:
@@ -85,7 +86,7 @@ class Wander:
         level, seen = self.level(station), information > 0.0
         safe = np.where(seen, information, 1.0)
         # the walk is in units of the noise variance of a typical lot
-        typical = np.where(self._lots > 0.0, self._scale / np.maximum(self._lots, 1.0), 1.0 / safe)
+        typical = np.where(self._lots[1] > 0.0, over(*self._lots), 1.0 / safe)
         variance = level.variance + WALKS[:, None] * typical
         total = variance + 1.0 / safe
         roots = np.sqrt(total)
@@ -139,40 +140,21 @@ class Wander:
         level.mean = np.where(seen, moved, level.mean)
         level.variance = np.where(seen, found.gain / safe, level.variance)
         level.known = level.known | seen
-        self._scale += np.where(seen, 1.0 / safe, 0.0)
-        self._lots += seen
+        self._lots += np.where(seen, 1.0 / safe, 0.0), seen
 
-    def arrays(self) -> dict[str, Array]:
-        """The state as named arrays."""
-        out: dict[str, Array] = {"likelihood": self.log_likelihood, "scale": np.stack([self._scale, self._lots])}
-        out |= {f"beside/{name}": value for name, value in self.beside.items()}
-        for station, level in self.stations.items():
-            out[f"station/{station}"] = np.stack([level.mean, level.variance])
-            out[f"known/{station}"] = level.known.astype(np.float64)
-            out |= {f"predictor/{name}{_BETWEEN}{station}": value for name, value in level.predictors.items()}
-        return out
+    def arrays(self) -> dict[str, Any]:
+        """The state as nested arrays."""
+        stations = {station: vars(level) for station, level in self.stations.items()}
+        return {"likelihood": self.log_likelihood, "beside": self.beside, "lots": self._lots, "stations": stations}
 
-    def restore(self, arrays: Mapping[str, Array]) -> None:
-        """Restore the state of :meth:`arrays`."""
-        self.log_likelihood = arrays["likelihood"].copy()
-        self._scale, self._lots = arrays["scale"].copy()
-        for key, value in arrays.items():
-            kind, _, name = key.partition("/")
-            if kind == "beside":
-                self.beside[name] = value.copy()
-            elif kind == "station":
-                self.stations[name] = Level(*value.copy(), known=arrays[f"known/{name}"] > 0.0)
-        for key, value in arrays.items():
-            kind, _, rest = key.partition("/")
-            if kind == "predictor":
-                driver, _, station = rest.partition(_BETWEEN)
-                self.stations[station].predictors[driver] = value.copy()
-
-
-def over(values: Array, weights: Array) -> Array:
-    """Values divided by weights; zero where a weight is zero."""
-    there = weights > 0.0
-    return np.where(there, values / np.where(there, weights, 1.0), 0.0)
+    @classmethod
+    def restored(cls, arrays: Mapping[str, Any]) -> "Wander":
+        """The filters with the state of :meth:`arrays`."""
+        new = cls(0)
+        new.log_likelihood, new._lots = arrays["likelihood"].copy(), arrays["lots"].copy()
+        new.beside = {name: value.copy() for name, value in arrays.get("beside", {}).items()}
+        new.stations = {station: Level(**deepcopy(level)) for station, level in arrays.get("stations", {}).items()}
+        return new
 
 
 def _likelihood(every: Array, found: Innovation, rms: Array) -> Array:

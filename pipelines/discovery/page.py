@@ -3,14 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.discovery.evidence import INSIDE, MEAN, STATION
+from inertial.discovery.evidence import MEAN, STATION
 from inertial.discovery.running_sums import Sums
 from inertial.frames import force_from_angles
 from inertial.uncertainty.rounding import short
+from pipelines.discovery.discoveries import Discoveries, plain
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
-from pipelines.discovery.evidence_state import hypothesis
-from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
-from pipelines.discovery.findings import Findings
+from pipelines.discovery.sentences import headline, scope_text, unexplained_text
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, still, svg_text
 from pipelines.drawing.chart import Role, level, symmetric
 from pipelines.drawing.mollweide import project, sphere
@@ -20,9 +19,9 @@ MOST_LEVELS = 30
 FAINT = 0.5  # evidence, in powers of ten, up to which nothing is drawn
 
 
-def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
+def render(found: Discoveries, document: DiscoverDocument, archive: str) -> str:
     """The page as one HTML text without other files."""
-    grown = growth_charts(findings, document)
+    grown = growth_charts(found, document)
     shown = [
         {
             "id": row["id"],
@@ -42,8 +41,8 @@ def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
             (unexplained_text(row), still(svg_text(map_chart(row))) if row["map"] else "")
             for row in document["unexplained"]
         ],
-        strongest="" if (strongest := strongest_chart(findings)) is None else still(svg_text(strongest)),
-        reach=still(svg_text(reach_chart(document, len(findings.state.order)))) if document["reach"] else "",
+        strongest="" if (strongest := strongest_chart(found)) is None else still(svg_text(strongest)),
+        reach=still(svg_text(reach_chart(document, len(found.state.order)))) if document["reach"] else "",
         short=short,
     )
 
@@ -78,9 +77,9 @@ def map_chart(row: UnexplainedRow) -> Chart:
     return Chart("Left by every effect of the catalogue", (sphere(title, (points,)),), 1, scale, height=260, note=note)
 
 
-def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, Chart]:
+def growth_charts(found: Discoveries, document: DiscoverDocument) -> dict[str, Chart]:
     """Growth of the evidence of each discovery from lot to lot, by ``grown-<id>``."""
-    known = {(discovery.name.effects[0], discovery.drivers[0]): discovery.carried for discovery in findings.discoveries}
+    known = {(discovery.name.effects[0], discovery.drivers[0]): discovery.carried for discovery in found.named}
     charts: dict[str, Chart] = {}
     for row in document["discoveries"]:
         carried = known.get((row["recommended"], row["driver"]))
@@ -102,23 +101,24 @@ def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, C
     return charts
 
 
-def strongest_chart(findings: Findings) -> Chart | None:
+def strongest_chart(found: Discoveries) -> Chart | None:
     """The largest evidence of each effect by each driver, in powers of ten; None if there is none to draw."""
-    state, effects = findings.state, findings.pool.effects
+    state, effects = found.state, found.source.pool.effects
     if not state.order:
         return None
-    drivers = list(dict.fromkeys(name.removesuffix(INSIDE) for name in state.sensor.drivers))
+    drivers = list(dict.fromkeys(plain(name) for name in state.sensor.drivers))
     drivers.sort(key=lambda name: (name not in {MEAN, STATION}, name))
     grid = np.zeros((len(effects), len(drivers)))
     for name, sums in state.sensor.drivers.items():
-        column = drivers.index(name.removesuffix(INSIDE))
+        column = drivers.index(plain(name))
         # evidence with a higher threshold is reduced by the difference of the thresholds
-        for index, log_e in enumerate(sums.log_e - state.needed(name) + state.least_needed):
-            row = effects.index(hypothesis(state, index)[0])
+        above = sums.log_e - state.needed(name)[: sums.s.size] + state.least_needed()
+        for hypothesis, log_e in zip(state.hypotheses, above, strict=False):
+            row = effects.index(hypothesis.effect)
             grid[row, column] = max(grid[row, column], log_e / np.log(10.0))
     if grid.max(initial=0.0) <= FAINT:
         return None
-    needed = state.least_needed / np.log(10.0)
+    needed = state.least_needed() / np.log(10.0)
     traces: list[Trace] = []
     shown: tuple[tuple[str, Role, NDArray[np.bool_]], ...] = (
         ("beyond the threshold", "before", grid >= needed),

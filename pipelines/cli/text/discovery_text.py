@@ -6,7 +6,7 @@ from inertial.counts import number_of
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, say, short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, PopulationRow, UnexplainedRow
-from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
+from pipelines.discovery.sentences import headline, scope_text, unexplained_text
 
 _SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
 

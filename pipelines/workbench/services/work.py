@@ -259,14 +259,14 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
     from pipelines.discovery import page
     from pipelines.discovery.discover import Look
     from pipelines.discovery.discover import discovered as looked_at
-    from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
+    from pipelines.discovery.sentences import headline, scope_text, unexplained_text
 
     looked = looked_at(Archive(request["archive"]), Look(device=str(request["device"])))
     report_progress(1, 2, "drawing")
     document = looked.document
     charts = {f"levels-{row['id']}": page.levels_chart(row) for row in document["discoveries"] if row["levels"]}
-    charts |= page.growth_charts(looked.findings, document)
-    if (strongest := page.strongest_chart(looked.findings)) is not None:
+    charts |= page.growth_charts(looked.found, document)
+    if (strongest := page.strongest_chart(looked.found)) is not None:
         charts["strongest"] = strongest
     if document["reach"]:
         charts["reach"] = page.reach_chart(document, document["pooled"]["lots"])

@@ -20,7 +20,7 @@ def maker() -> ArchiveMaker:
 
 
 def pool() -> Pool:
-    return Pool(maker().columns, maker().size.reshape(-1), *maker().products)
+    return Pool(maker().products)
 
 
 HIDDEN = [
@@ -56,7 +56,7 @@ def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) 
 def test_an_effect_in_the_model_of_every_lot_leaves_nothing_of_it() -> None:
     result = archive("third_order", "wafer")
     assert result.alarms
-    own, count = pool(), len(maker().columns)
+    own, count = pool(), len(maker().products.columns)
     at = own.places("third_order")[0] + count * np.arange(3)
     near = own.places("odd_quadratic")[0] + count * np.arange(3)
     changed = [own.with_effect(lot, "third_order") for lot in result.lots]
