@@ -185,14 +185,13 @@ class Evidence:
     def _add(self, lot: ScoredLot) -> None:
         total, info = lot.score.sum(axis=0), lot.information
         size = over(total, info)
-        found = self.wander.innovation(lot.station, size, info)
         between = self._scales["between"]
-        rms = between.rms
+        found = self.wander.innovation(lot.station, size, info, between.rms)
         self._mean(over(total, np.sqrt(info)))
         self._stations(lot, size)
         self._between(lot, found)
         self._inside(lot)
-        self.wander.update(lot.station, size, info, found, rms)
+        self.wander.update(found)
         between.add(between.bounded(found.value))
         self.score += self._limited(size, info)[1]
         self.information += info
@@ -234,8 +233,7 @@ class Evidence:
 
         A level is predicted by lots of other stations, if there are any, so that the wander of a station does not count.
         """
-        scale, prior = self._scales["between"], SHRUNK * self._typical
-        rms, by_unit, ratio = scale.rms, lot.own, lot.information / lot.total
+        rms, by_unit, ratio, prior = found.rms, lot.own, lot.information / lot.total, SHRUNK * self._typical
         raw = np.abs(found.value)
         part = np.where(raw > BOUND * rms, over(BOUND * rms, raw), 1.0)
         for name, labels in lot.levels.items():
@@ -246,8 +244,8 @@ class Evidence:
             elsewhere = here if len(self.wander.stations) > 1 else None
             each, behind = table.predicted(labels, prior, elsewhere)
             prediction, told = lot.averaged(each), lot.averaged(behind) >= prior
-            value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, told)
-            self._sums(name, two_sided=False).add(scale.bounded(value) / rms * np.clip(left / rms, -BOUND, BOUND))
+            value, left = self.wander.beside_driver(name, prediction, found, told)
+            self._add_between(name, value, left / rms, two_sided=False)
             score = (lot.score - by_unit * ratio * self._centre()) * part
             for each_table in (table, here):
                 each_table.add(labels, score, by_unit * ratio)
@@ -257,9 +255,14 @@ class Evidence:
             if standardised is None:
                 continue
             prediction = np.full(self.count, standardised)
-            value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, found.known)
-            weight = np.clip(left / np.sqrt(np.maximum(self._typical, 1e-300)), -BOUND, BOUND)
-            self._sums(name, two_sided=True).add(scale.bounded(value) / rms * weight)
+            value, left = self.wander.beside_driver(name, prediction, found, found.known)
+            self._add_between(name, value, left / np.sqrt(np.maximum(self._typical, 1e-300)), two_sided=True)
+
+    def _add_between(self, name: str, value: Array, predicted: Array, *, two_sided: bool) -> None:
+        """Add the agreement of an innovation with a driver's prediction, (h,) each, to the sums of the driver."""
+        scale = self._scales["between"]
+        x = scale.bounded(value) / scale.rms * np.clip(predicted, -BOUND, BOUND)
+        self._sums(name, two_sided=two_sided).add(x)
 
     def _standardised(self, name: str, value: float) -> float | None:
         """A lot's value of a driver less the mean of earlier ones, over their standard deviation; None for the first three."""
@@ -288,35 +291,29 @@ class Evidence:
                 table = self.levels.setdefault(inside, Levels(self.count))
                 predicted = table.predicted(labels, SHRUNK / len(labels) * typical)[0]
             if len(set(labels)) > 1:
-                self._add_inside(inside, lot, predicted, left, two_sided=False)
+                self._add_inside(inside, lot, predicted - lot.averaged(predicted), left, two_sided=False)
             if name != UNIT:
                 alike = np.array([by_unit[[other == label for other in labels]].sum(axis=0) for label in labels])
                 self.levels[inside].add(labels, left, by_unit * (1.0 - alike / lot.total))
-        for name, numbers in lot.numbers.items():
-            if np.isfinite(numbers).all() and float(np.ptp(numbers)) > 0.0:
-                predicted = np.broadcast_to(numbers[:, None], by_unit.shape)
-                self._add_inside(name + INSIDE, lot, predicted, left, two_sided=True)
-        self._slopes(lot, left)
+        for name, numbers in {
+            **{name: of_units[:, None] for name, of_units in lot.numbers.items()},
+            **lot.slopes,
+        }.items():
+            if np.isfinite(numbers).all() and np.ptp(numbers, axis=0).any():
+                about = numbers - lot.averaged(numbers)
+                self._add_inside(name + INSIDE, lot, about, left, two_sided=True)
+                # for the estimate of the slope
+                sums = np.stack([(left * about).sum(axis=0), np.zeros(self.count)])
+                squares = np.stack([(by_unit * about**2).sum(axis=0), by_unit.sum(axis=0)])
+                self.levels.setdefault(name + INSIDE, Levels(self.count)).add((SLOPE, ALL), sums, squares)
         scale.add(np.sqrt(np.mean(over(left, root) ** 2, axis=0)))
 
-    def _slopes(self, lot: ScoredLot, left: Array) -> None:
-        """Add evidence of numbers that also differ by axis, and the sums for the estimates of their slopes."""
-        for name, numbers in lot.slopes.items():
-            about = numbers - lot.averaged(numbers)
-            if np.isfinite(about).all() and about.any():
-                self._add_inside(name + INSIDE, lot, numbers, left, two_sided=True)
-                sums = np.stack([(left * about).sum(axis=0), np.zeros(self.count)])
-                squares = np.stack([(lot.own * about**2).sum(axis=0), lot.own.sum(axis=0)])
-                self.levels.setdefault(name + INSIDE, Levels(self.count)).add((SLOPE, ALL), sums, squares)
-
-    def _add_inside(self, name: str, lot: ScoredLot, predicted: Array, left: Array, *, two_sided: bool) -> None:
-        """Add the agreement of scores ``left`` with predicted sizes, (units, h) each, to the sums of a driver."""
-        about = predicted - lot.averaged(predicted)
+    def _add_inside(self, name: str, lot: ScoredLot, about: Array, left: Array, *, two_sided: bool) -> None:
+        """Add the agreement of scores ``left`` with predicted sizes about their mean, (units, h) each, to a driver's sums."""
         size = np.sqrt((lot.own * about**2).sum(axis=0))
         scale = self._scales["inside"]
-        rms = scale.rms
-        x = scale.bounded(over((left * about).sum(axis=0), size)) / rms
-        self._sums(name, two_sided=two_sided).add(x if two_sided else x * np.minimum(size / rms, BOUND))
+        x = scale.bounded(over((left * about).sum(axis=0), size)) / scale.rms
+        self._sums(name, two_sided=two_sided).add(x if two_sided else x * np.minimum(size / scale.rms, BOUND))
 
     def _of_units(self, units: tuple[str, ...]) -> Array:
         """Sizes (units, h) of the units in their earlier lots; zero for a unit measured for the first time."""

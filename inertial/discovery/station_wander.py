@@ -38,11 +38,16 @@ class Level:
 class Innovation:
     """Innovation of a lot: its deviation from the prediction by its station's past, over the standard deviation.
 
+    size, information : (h,), of the lot; zero information: not measured · rms : (h,), of earlier innovations
     value : (h,), at the walk that the past prefers, of unit variance if the noise is as stated; zero if there is no past
     every : (q, h), the same at each walk · gain, roots : (q, h), filter gains, and standard deviations of the innovations
     known : (h,), whether the station has earlier lots
     """
 
+    station: str
+    size: Array
+    information: Array
+    rms: Array
     value: Array
     every: Array
     gain: Array
@@ -81,8 +86,8 @@ class Wander:
             self.stations[station] = Level(np.zeros(shape), np.zeros(shape), np.zeros(shape[1], dtype=bool))
         return self.stations[station]
 
-    def innovation(self, station: str, size: Array, information: Array) -> Innovation:
-        """The innovation of a lot with sizes (h,) and information (h,); zero information: not measured."""
+    def innovation(self, station: str, size: Array, information: Array, rms: Array) -> Innovation:
+        """The innovation of a lot with sizes (h,) and information (h,), beside the rms (h,) of earlier ones."""
         level, seen = self.level(station), information > 0.0
         safe = np.where(seen, information, 1.0)
         # the walk is in units of the noise variance of a typical lot
@@ -93,17 +98,10 @@ class Wander:
         known = level.known & seen
         every = np.where(known, (size - level.mean) / roots, 0.0)
         gain = np.where(level.known, variance / total, 1.0)
-        return Innovation(_chosen_of(every, self.log_likelihood), every, gain, roots, known)
+        value = _chosen_of(every, self.log_likelihood)
+        return Innovation(station, size, information, rms, value, every, gain, roots, known)
 
-    def beside_driver(
-        self,
-        name: str,
-        station: str,
-        prediction: Array,
-        found: Innovation,
-        rms: Array,
-        told: Flags,
-    ) -> tuple[Array, Array]:
+    def beside_driver(self, name: str, prediction: Array, found: Innovation, told: Flags) -> tuple[Array, Array]:
         """Innovation of a lot, and innovation of a driver's prediction in the same filter, (h,) each; updates the state.
 
         The walk is the one that the past prefers with the driver's predictions in the model: a change that the driver explains at
@@ -113,7 +111,7 @@ class Wander:
         ----------
         told : (h,), whether the prediction is based on enough lots; if not, a step does not count as evidence of a walk
         """
-        level = self.level(station)
+        level = self.level(found.station)
         likelihood = self.beside.setdefault(name, np.zeros_like(self.log_likelihood))
         before = level.predictors.get(name)
         if before is None:
@@ -121,22 +119,17 @@ class Wander:
             return np.zeros(prediction.size), np.zeros(prediction.size)
         every = np.where(found.known, (prediction - before) / found.roots, 0.0)
         value, left = _chosen_of(found.every, likelihood), _chosen_of(every, likelihood)
-        likelihood += np.where(told, _likelihood(found.every - every, found, rms), 0.0)
+        likelihood += np.where(told, _likelihood(found.every - every, found), 0.0)
         before += found.gain * (prediction - before)
         return value, left
 
-    def update(self, station: str, size: Array, information: Array, found: Innovation, rms: Array) -> None:
-        """Update the filter of a station with a lot.
-
-        Parameters
-        ----------
-        rms : (h,), of earlier innovations; larger ones than five times it are clipped
-        """
-        level, seen = self.level(station), information > 0.0
-        bounded = np.clip(found.every, -_LARGEST * rms, _LARGEST * rms)
-        self.log_likelihood += _likelihood(found.every, found, rms)
-        moved = np.where(level.known, level.mean + found.gain * bounded * found.roots, size)
-        safe = np.where(seen, information, 1.0)
+    def update(self, found: Innovation) -> None:
+        """Update the filter of a station with a lot; innovations larger than five times their rms are clipped."""
+        level, seen = self.level(found.station), found.information > 0.0
+        bounded = np.clip(found.every, -_LARGEST * found.rms, _LARGEST * found.rms)
+        self.log_likelihood += _likelihood(found.every, found)
+        moved = np.where(level.known, level.mean + found.gain * bounded * found.roots, found.size)
+        safe = np.where(seen, found.information, 1.0)
         level.mean = np.where(seen, moved, level.mean)
         level.variance = np.where(seen, found.gain / safe, level.variance)
         level.known = level.known | seen
@@ -157,9 +150,9 @@ class Wander:
         return new
 
 
-def _likelihood(every: Array, found: Innovation, rms: Array) -> Array:
+def _likelihood(every: Array, found: Innovation) -> Array:
     """Log likelihood ratio (q, h) of innovations at each walk to that without one; innovations are clipped at five rms."""
-    bounded = np.clip(every, -_LARGEST * rms, _LARGEST * rms) / np.maximum(rms, 1e-300)
+    bounded = np.clip(every, -_LARGEST * found.rms, _LARGEST * found.rms) / np.maximum(found.rms, 1e-300)
     gained = -np.log(found.roots) - 0.5 * bounded**2
     return np.where(found.known, gained - gained[0], 0.0)
 

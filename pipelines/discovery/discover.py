@@ -82,7 +82,7 @@ def discovered(archive: Archive, look: Look) -> Looked:
 def _in_memory(source: DiscoveryArchive, look: Look) -> Discoveries:
     """Discoveries of the lots since a day, with the attributes known now; nothing is stored."""
     runs = [run for run in source.pooled() if run not in source.revoked and source.day_of(run) >= look.since]
-    if not runs:
+    if source.pooled() and not runs:
         raise WrongUse(f"discover: no lot of {source.device} was measured since {look.since}; give an earlier --since")
     return Discoveries(source, grown_by_days(source, Evidences.fresh(source), runs))
 

@@ -70,7 +70,8 @@ class DiscoveryRow(TypedDict):
     levels: list[DiscoveredLevel]
     carried_by: CarriedBy
     confirmed: Annotated[
-        bool | None, "whether later lots show what earlier ones predict; null: fewer than 20 later lots"
+        bool | None,
+        "whether later lots show what earlier ones predict; null: fewer than 20 of them, or an error of references",
     ]
     confirmed_factor: NotRequired[Annotated[list[float], "later over predicted, and its standard error"]]
     next: str

@@ -38,6 +38,20 @@ def scope_text(row: DiscoveryRow) -> str:
     return text
 
 
+def support_text(row: DiscoveryRow) -> list[str]:
+    """How many lots carry a discovery, and whether later ones confirm it; nothing for errors of the references."""
+    carried = row["carried_by"]
+    if carried["lots_for"] is None:
+        return []
+    less = short(carried["log_e_without_largest_2_percent"])
+    confirmed = "not confirmed yet: fewer than 20 lots were measured since it was found"
+    if row["confirmed"] is not None:
+        told = "show" if row["confirmed"] else "do not show"
+        confirmed = f"the lots since it was found {told} what the earlier ones predict"
+    share = short(100.0 * carried["lots_for"])
+    return [f"{share} % of the lots speak for it; e^{less} without the 2 % that speak most", confirmed]
+
+
 def unexplained_text(row: UnexplainedRow) -> str:
     """A sentence on a dependence on a driver that no effect of the catalogue explains."""
     what = "a function of the pose" if row["map"] else "something"

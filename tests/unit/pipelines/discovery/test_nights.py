@@ -18,7 +18,9 @@ from pipelines.audit.calibrations import Calibrations
 from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
+from pipelines.discovery.discoveries import Discoveries
 from pipelines.discovery.evidence_state import ALPHA, STATION_DRIVERS, Alarm
+from pipelines.discovery.findings import document_of
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.nights import brought_up, remembered
 from pipelines.discovery.score_store import ScoreStore
@@ -152,6 +154,12 @@ def test_a_revoked_run_is_taken_out_from_that_night_on_and_one_that_goes_on_is_n
     assert replayed.order == state.order
     assert {(a.driver, a.index) for a in replayed.alarms} == {(a.driver, a.index) for a in state.alarms}
     assert state.alarms
+    # with fewer lots than a discovery needs there is no evidence: what was found is not judged any more
+    again.__dict__["revoked"] = set(again.pooled()[20:])
+    left = document_of(Discoveries(again, brought_up(again)))
+    assert (left["discoveries"], left["unexplained"], left["held"]) == ([], [], [])
+    assert left["warnings"][0].startswith("19 lots: a discovery needs at least 30")
+    assert f"{LOTS - 19} runs taken out, because a calibration was revoked" in left["warnings"]
     run = next((Path(str(archive.root)) / "runs").iterdir())
     (run / "sealed.json").unlink()
     assert run.name not in {info.id for info in DiscoveryArchive(archive).infos}
@@ -168,6 +176,9 @@ def test_attributes_that_come_later_start_with_the_lots_after_them(archive: Arch
     assert {"name": "supplier", "status": "judged"} in looked_back["drivers"]
     assert looked_back["looking_back"]
     assert len(nights(archive)) == 1
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(DiscoveryArchive, "pooled", lambda _: [])
+        assert discovered(archive, Look(looking_back=True)).document["pooled"]["lots"] == 0
 
 
 @pytest.mark.slow
