@@ -75,7 +75,5 @@ def _evidence(increments: Array) -> Array:
     scale = Scale(np.where(spread > 0.0, spread, 1.0))
     sums = Sums.of(increments.shape[1], two_sided=True)
     for x in increments:
-        bounded = scale.bounded(x)
-        sums.add(bounded / scale.rms)
-        scale.add(bounded)
+        sums.add(scale.standardised(x))
     return sums.log_e

@@ -187,7 +187,7 @@ class Evidence:
         size = over(total, info)
         between = self._scales["between"]
         found = self.wander.innovation(lot.station, size, info, between.rms)
-        self._mean(over(total, np.sqrt(info)))
+        self._sums(MEAN, two_sided=True).add(self._scales["mean"].standardised(over(total, np.sqrt(info))))
         self._stations(lot, size)
         self._between(lot, found)
         self._inside(lot)
@@ -196,12 +196,6 @@ class Evidence:
         self.score += self._limited(size, info)[1]
         self.information += info
         self._taken += 1
-
-    def _mean(self, z: Array) -> None:
-        scale = self._scales["mean"]
-        bounded = scale.bounded(z)
-        self._sums(MEAN, two_sided=True).add(bounded / scale.rms)
-        scale.add(bounded)
 
     @property
     def _typical(self) -> Array:

@@ -140,6 +140,12 @@ class Scale:
         limit = BOUND * self.rms
         return np.clip(value, -limit, limit)
 
+    def standardised(self, value: Array) -> Array:
+        """A value (h,), clipped, over the root mean square of the earlier ones, which it joins."""
+        bounded, rms = self.bounded(value), self.rms
+        self.add(bounded)
+        return bounded / rms
+
     def add(self, value: Array) -> None:
         """Add a clipped value (h,); zeros are not counted."""
         self.sums += value**2, value != 0.0

@@ -64,12 +64,12 @@ def discovered(archive: Archive, look: Look) -> Looked:
         source.device  # noqa: B018 - refuses an unknown name before any run is scored
         source.score(look.workers, look.distribute)
         state = brought_up(source)
-        found = Discoveries(source, state)
-        keep = not (look.since or look.looking_back or look.effects or look.drivers or look.explained)
-        document = remembered(source, state, document_of(found, found_before(source, state)), keep=keep)
         if look.since or look.looking_back:
             found = _in_memory(source, look)
             document = document_of(found, looking_back=True)
+        else:
+            found, keep = Discoveries(source, state), not (look.effects or look.drivers or look.explained)
+            document = remembered(source, state, document_of(found, found_before(source, state)), keep=keep)
         if look.effects:
             found, document = _with_effects(found, document, look.effects)
         if look.populations:

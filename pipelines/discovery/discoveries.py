@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -12,13 +11,11 @@ from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE, SLOT, ST
 from inertial.discovery.naming import Name, Unnamed
 from inertial.discovery.pose_shape import SHAPE, angles_of, map_of
 from inertial.discovery.running_sums import Sums
-from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow, UnexplainedRow
+from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow, Scope, UnexplainedRow
 from pipelines.discovery.evidence_state import Alarm, Evidences
 from pipelines.discovery.lot_source import OWN_TEMPCO, SEASON, DiscoveryArchive
 from pipelines.discovery.score_store import AXES
 from schemas.units import MICRO
-
-Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
 
 LATER = 20  # smallest number of lots after an alarm that can confirm it
 MOST_NAMED = 3000  # largest number of lots used for naming, evenly spread over a larger archive

@@ -4,6 +4,8 @@ from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
+Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
+
 
 class LeftOutRun(TypedDict):
     """A run that is not pooled."""
@@ -65,7 +67,7 @@ class DiscoveryRow(TypedDict):
     interval_ug: Annotated[list[float], "95 %"]
     size_floors: Annotated[float | None, "the same over the noise of a dwell of one lot"]
     log_e: float
-    scope: Literal["sensor", "station", "sensor_or_station", "thermometer"]
+    scope: Scope
     because: str
     levels: list[DiscoveredLevel]
     carried_by: CarriedBy

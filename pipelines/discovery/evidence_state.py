@@ -102,14 +102,9 @@ class Evidences:
 
     def log_e(self, driver: str) -> Array:
         """Logarithm of the evidence of every hypothesis by a driver, -inf where it does not judge."""
-        both = (self.sensor, self.sensor.drivers), (self.station, self.station.drivers)
-        judged = (driver in self.sensor.drivers, driver in self.station.drivers and driver in STATION_DRIVERS)
-        return np.concatenate(
-            [
-                drivers[driver].log_e if known else np.full(evidence.size, -np.inf)
-                for (evidence, drivers), known in zip(both, judged, strict=True)
-            ]
-        )
+        of_station = self.station.drivers.get(driver) if driver in STATION_DRIVERS else None
+        parts = (self.sensor, self.sensor.drivers.get(driver)), (self.station, of_station)
+        return np.concatenate([np.full(of.size, -np.inf) if sums is None else sums.log_e for of, sums in parts])
 
     def needed(self, driver: str) -> Array:
         """Threshold of the log evidence of each hypothesis by a driver.
