@@ -182,7 +182,7 @@ class DiscoveryArchive:
         for product in self.store.products:
             at = _indices(columns, product.columns)
             lots = product.lots * product.lot.reshape(AXES, at.size, AXES, at.size)
-            lot[np.ix_(range(AXES), at, range(AXES), at)] += lots
+            lot[np.ix_(np.arange(AXES), at, np.arange(AXES), at)] += lots
             inside[:, at[:, None], at] += product.lots * product.inside
             size[:, at] += product.lots * product.size.reshape(AXES, -1)
             weight[at] += product.lots
