@@ -27,3 +27,9 @@ def levels_apart(values: Array, width: float) -> int:
         if value - begin >= width:
             count, begin = count + 1, value
     return count
+
+
+def over(values: Array | float, weights: Array) -> Array:
+    """Values divided by weights; zero where a weight is zero."""
+    there = weights > 0.0
+    return np.where(there, values / np.where(there, weights, 1.0), 0.0)

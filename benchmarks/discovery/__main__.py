@@ -157,8 +157,7 @@ def _told(part: tuple[int, int, Hidden]) -> tuple[list[Name], list[Unnamed]] | N
     result = maker.archive(own, 1000, hidden, Setting(), keep=True)
     if not result.first:
         return None
-    pool = Pool(maker.columns, maker.size.reshape(-1), *maker.products)
-    return pool.names(result.lots, result.alarms, maker.state_of(result.evidence).least_needed)
+    return Pool(maker.products).names(result.lots, result.alarms, maker.state_of(result.evidence).least_needed())
 
 
 def unexplained(given: argparse.Namespace) -> None:

@@ -7,7 +7,7 @@ calibration leaves of it, over the noise of a dwell.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from benchmarks.discovery.lots import Lots, World
 from inertial.discovery.evidence import Evidence, ScoredLot
-from inertial.discovery.scores import LotScores
-from pipelines.discovery.evidence_state import Alarm, Evidences, hypothesis, numbered
-from pipelines.discovery.nights import held
+from inertial.discovery.scores import LotScores, Products
+from pipelines.discovery.evidence_state import Alarm, Evidences, numbered
 
 Array = NDArray[np.float64]
 UNITS, A_NIGHT = 8, 20
@@ -57,14 +56,30 @@ class Result:
     alarms: set[tuple[str, str]] = field(default_factory=set[tuple[str, str]])
 
 
+def earlier_in(order: Sequence[ScoredLot]) -> Callable[[str, int], tuple[Array, Array] | None]:
+    """Score and information (h,) of a unit in the first n lots of an order that grows; None if it was in none."""
+    index: dict[str, list[int]] = {}
+    known = 0
+
+    def earlier(unit: str, taken: int) -> tuple[Array, Array] | None:
+        nonlocal known
+        for number in range(known, len(order)):
+            for serial in order[number].units:
+                index.setdefault(serial, []).append(number)
+        known = len(order)
+        of_unit = [np.stack(order[k].inside)[:, order[k].units.index(unit)] for k in index.get(unit, []) if k < taken]
+        return (*np.sum(of_unit, axis=0),) if of_unit else None
+
+    return earlier
+
+
 class ArchiveMaker:
     """Archives from one bank."""
 
     def __init__(self, lots: Sequence[LotScores], world: World) -> None:
-        self.bank, self.columns, self._world = lots, lots[0].columns, world
-        self.size = np.mean([one.size for one in lots], axis=0)
-        self.floor = float(np.mean([one.floor for one in lots]))
-        self.products = tuple(np.mean([getattr(one, name) for one in lots], axis=0) for name in ("lot", "inside"))
+        self.bank, self._world = lots, world
+        self.products = Products.mean([scores.products for scores in lots])
+        self.floor = float(np.mean([scores.floor for scores in lots]))
 
     def archive(
         self,
@@ -78,11 +93,13 @@ class ArchiveMaker:
     ) -> Result:
         """An archive night by night, to its end or until a driver has been found."""
         rng = np.random.default_rng([seed, 4111])
-        result = Result(Evidence(3 * len(self.columns), columns=numbered(self.columns)))
+        columns, before = self.products.columns, list[ScoredLot]()
+        result = Result(Evidence(3 * len(columns), earlier_in(before), numbered(columns)))
         state, own = _State(rng, setting.stations), Lots(self._world, seed)
         for number in range(count):
             lot = self._lot(rng, state, own, number, count, hidden, setting)
             result.evidence.add(lot)
+            before.append(lot)
             if keep:
                 result.lots.append(lot)
             if number % A_NIGHT == A_NIGHT - 1 and number >= 29:
@@ -96,15 +113,16 @@ class ArchiveMaker:
     def state_of(self, evidence: Evidence) -> Evidences:
         """The evidence as the product has it: all drivers are of the first night."""
         generations = dict.fromkeys(evidence.drivers, 0)
-        return Evidences("", self.columns, self.bank[0].station, evidence, Evidence(0), generations=generations)
+        return Evidences(self.products.columns, (), evidence, Evidence(0), generations=generations)
 
     def _alarmed(self, evidence: Evidence) -> Iterator[tuple[str, str]]:
         """Drivers and effects with an alarm that is not held, as the product decides."""
         state = self.state_of(evidence)
         for name, sums in evidence.drivers.items():
             for place in map(int, np.flatnonzero(sums.log_e >= state.needed(name))):
-                if not held(state, Alarm(name, place, 0, 0, 0.0)):
-                    yield name, hypothesis(state, place)[0]
+                alarm = Alarm(name, place, 0, 0, 0.0)
+                if not state.held(alarm):
+                    yield name, state.effect_of(alarm)
 
     def _lot(
         self,
@@ -142,28 +160,28 @@ class ArchiveMaker:
             "supplier": tuple(f"s{k}" for k in rng.integers(0, 3, UNITS)),
             "season": (f"month {(number // A_NIGHT // 30) % 12}",) * UNITS,
         }
-        information = np.diagonal(one.lot).copy()
         return ScoredLot(
             f"{number}",
             f"s{station}",
             number / A_NIGHT,
             units,
-            score.reshape(UNITS, -1),
-            one.own.reshape(UNITS, -1),
-            information,
+            score,
+            one.own,
+            one.information,
             levels,
             {"radius": radius},
-            {"own temperature coefficient": np.repeat(one.tempco, len(self.columns), axis=1)},
+            {"own temperature coefficient": np.repeat(one.tempco, len(self.products.columns), axis=1)},
         )
 
     def _change(self, one: LotScores, effect: str, size: Array) -> Array:
         """What coefficients (units, 3), in floors, add to the scores of a lot."""
-        k = next(at for at, (name, _) in enumerate(self.columns) if name == effect)
-        coefficient = size * self.floor / np.maximum(self.size[:, k], 1e-300)
+        columns = self.products.columns
+        k = next(at for at, (name, _) in enumerate(columns) if name == effect)
+        here = np.arange(3) * len(columns) + k
+        coefficient = size * self.floor / np.maximum(self.products.size[here], 1e-300)
         mean = coefficient.mean(axis=0)
-        inside = np.einsum("ak,ua->uak", one.inside[:, :, k], coefficient - mean)
-        common = one.lot[:, np.arange(3) * len(self.columns) + k] @ mean
-        return inside + common.reshape(3, -1) / UNITS
+        inside = np.einsum("ak,ua->uak", one.products.inside[:, :, k], coefficient - mean)
+        return inside.reshape(UNITS, -1) + one.products.lot[:, here] @ mean / UNITS
 
 
 class _State:

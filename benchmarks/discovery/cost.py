@@ -62,13 +62,12 @@ def _looked(folder: Path) -> tuple[float, float]:
 def _copies(folder: Path, count: int, seed: int) -> None:
     """Runs with other names, days and serials, and the scores of them with other signs."""
     source = DiscoveryArchive(Archive(str(folder)))
-    products = source.store.products[0]
-    runs = [source.store.run(run) for run in source.store.rows]
+    runs = [source.store.run(run) for run in source.store.heads]
     rng = np.random.default_rng(seed)
     new: list[ScoredRun] = []
     for number in range(count):
         one = runs[number % REAL]
-        if one.score is None or one.station_scores is None:
+        if one.scores is None:
             raise RuntimeError(one.run)
         name, sign = f"copy-{number:010x}", float(rng.choice([-1.0, 1.0]))
         place = folder / "runs" / name
@@ -80,12 +79,9 @@ def _copies(folder: Path, count: int, seed: int) -> None:
         for unit, serial in zip(about["lot"]["units"], units, strict=True):
             unit["serial"] = serial
         (place / "run.json").write_text(json.dumps(about), encoding="utf-8")
-        scores = {
-            "score": sign * one.score,
-            "station_scores": np.stack([sign * one.station_scores[0], one.station_scores[1]]),
-        }
-        averages = {"lot": products.lot, "inside": products.inside, "size": products.size}
-        new.append(replace(one, run=name, when=about["when"], units=units, **scores, **averages))
+        of_station = one.scores.of_station * np.array([[sign], [1.0]])
+        scores = replace(one.scores, score=sign * one.scores.score, of_station=of_station)
+        new.append(replace(one, run=name, when=about["when"], units=units, scores=scores))
         if len(new) == A_FILE or number == count - 1:
             scores_file = folder / "discovery" / "scores" / f"{number // A_FILE + 2:06d}.scores"
             files.publish(scores_file, derived.framed(written(new)))

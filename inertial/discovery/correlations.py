@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.arrays import NORMAL_MEDIAN, Array
+from inertial.arrays import NORMAL_MEDIAN, Array, over
 from inertial.discovery.running_sums import FIRST, Scale, Sums
-from inertial.discovery.station_wander import over
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,5 @@ def _evidence(increments: Array) -> Array:
     scale = Scale(np.where(spread > 0.0, spread, 1.0))
     sums = Sums.of(increments.shape[1], two_sided=True)
     for x in increments:
-        bounded = scale.bounded(x)
-        sums.add(bounded / scale.rms)
-        scale.add(bounded)
+        sums.add(scale.standardised(x))
     return sums.log_e

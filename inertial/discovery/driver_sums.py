@@ -3,124 +3,130 @@
 import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
-from inertial.arrays import NORMAL_MEDIAN, Array
-from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
-from inertial.discovery.station_wander import over
-
-INSIDE_ONLY = {SLOT, UNIT}
-"""Drivers that are judged only by differences within a lot."""
+from inertial.arrays import NORMAL_MEDIAN, Array, over
+from inertial.discovery.evidence import MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
+from inertial.discovery.running_sums import Levels
 
 
-@dataclass
-class DriverSums:
-    """Sums of a driver by level, in units of the noise of the lots.
+class DriverSums(Levels):
+    """Sums of a driver by level, in units of the noise of the lots; the level of a number is its slope.
 
-    levels : score and information, (2, h), by label ("slope" or "all" for a driver without levels)
-    units : number of units of each level · about : origin from which a numerical driver is counted
+    units : number of units of each level · about : origin from which a number is counted
     inside, between : information from differences within lots, and from the means of lots
     """
 
-    levels: dict[str, Array] = field(default_factory=dict[str, Array])
-    units: Counter[str] = field(default_factory=Counter[str])
-    about: float = 0.0
-    inside: float = 0.0
-    between: float = 0.0
+    def __init__(self, driver: str, lots: Sequence[ScoredLot]) -> None:
+        super().__init__(lots[0].information.size)
+        self.driver, self.units, self.inside, self.between = driver, Counter[str](), 0.0, 0.0
+        means = [float(numbers.mean()) for lot in lots if (numbers := lot.number(driver)) is not None]
+        self.about = float(np.nanmean(means)) if means else 0.0
 
     @property
     def labels(self) -> list[str]:
         """Names of the g levels."""
-        return list(self.levels)
+        return list(self.place)
 
-    @cached_property
-    def score(self) -> Array:
-        """Scores (g, h) of the levels; read after the last lot was added."""
-        return np.stack([score for score, _ in self.levels.values()])
-
-    @cached_property
-    def information(self) -> Array:
-        """Information (g, h) of the levels; read after the last lot was added."""
-        return np.stack([information for _, information in self.levels.values()])
+    @property
+    def inside_only(self) -> bool:
+        """Whether the driver is judged only by differences within a lot."""
+        return self.driver in {SLOT, UNIT}
 
     @property
     def mixed(self) -> bool:
         """Whether most information comes from differences within lots, so that the columns' products within lots apply."""
         return self.inside > self.between
 
-    def add(self, label: str, score: Array, information: Array, units: int) -> None:
+    @property
+    def centred(self) -> Array:
+        """Scores (g, h) of levels; for a driver judged within lots only, about the mean over all levels."""
+        if not self.inside_only or len(self.labels) < 2:
+            return self.score
+        return self.score - self.information * over(self.score.sum(axis=0), self.information.sum(axis=0))
+
+    def weights(self, lot: ScoredLot) -> Array:
+        """Weight of each level in each unit of a lot, (units, levels): 1 or 0, or a number about its origin."""
+        numbers = lot.number(self.driver)
+        if numbers is not None:
+            return np.where(np.isfinite(numbers), numbers - self.about, 0.0)[:, None]
+        out = np.zeros((len(lot.units), len(self.labels)))
+        for unit, label in enumerate(lot.labels(self.driver)):
+            if label in self.place:
+                out[unit, self.place[label]] = 1.0
+        return out
+
+    def predicted_sizes(self, lot: ScoredLot) -> Array:
+        """Sizes (units, h) that the sums predict for the units of a lot."""
+        return self.weights(lot) @ over(self.centred, self.information)
+
+    def gather(self, lot: ScoredLot, mean: Array, noise: tuple[float, float], seen: Mapping[str, int]) -> None:
+        """Add a lot.
+
+        Parameters
+        ----------
+        mean : (h,), mean size of the lots of its station · noise : as of :func:`_noise`
+        seen : number of lots of each unit; of those with one nothing is learnt
+        """
+        between, within = noise
+        by_unit, total, info, left = lot.own, lot.total, lot.information, lot.inside[0]
+        sums, labels = np.where(info > 0.0, lot.score.sum(axis=0), 0.0), lot.labels(self.driver)
+        numbers = lot.number(self.driver)
+        if self.driver in {MEAN, STATION}:
+            self._add_level(labels[0], sums / between, info / between, len(labels))
+        elif numbers is None:
+            for label in dict.fromkeys(labels):
+                here = np.array([other == label for other in labels])
+                of_level = by_unit[here].sum(axis=0)
+                share = of_level / total
+                score, information = left[here].sum(axis=0) / within, of_level * (1.0 - share) / within
+                self.inside += float(information.sum())
+                if not self.inside_only:  # add the information of the lot's mean
+                    common = share**2 * info / between
+                    score, information = score + share * sums / between, information + common
+                    self.between += float(common.sum())
+                if self.driver != UNIT or seen[label] > 1:
+                    self._add_level(label, score, information, int(here.sum()))
+        elif np.isfinite(numbers).all():
+            from_origin = (numbers - self.about)[:, None]
+            about, centre = from_origin - lot.averaged(from_origin), float(from_origin.mean())
+            score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - info * mean) / between
+            inside, common = (about**2 * by_unit).sum(axis=0) / within, centre**2 * info / between
+            self.inside, self.between = self.inside + float(inside.sum()), self.between + float(common.sum())
+            self._add_level(SLOPE, score, inside + common, len(lot.units))
+
+    def _add_level(self, label: str, score: Array, information: Array, units: int) -> None:
         """Add scores and information (h,) of some units to a level."""
-        self.levels.setdefault(label, np.zeros((2, score.size)))
-        self.levels[label] += score, information
-        self.units[label] += units
+        if label:
+            self.add((label,), score[None], information[None])
+            self.units[label] += units
 
 
-def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, DriverSums]:
-    """Sums of drivers over lots, from differences between and within lots together, by driver."""
+def gathered(
+    lots: Sequence[ScoredLot], drivers: Sequence[str], compared: Sequence[ScoredLot] = ()
+) -> dict[str, DriverSums]:
+    """Sums of drivers over lots, from differences between and within lots together, by driver.
+
+    compared : other lots that the sums are compared with: a unit counts that is in one of these and in one of those
+    """
     means = _station_means(lots)
-    noise, within = _noise(lots, means)
-    out = {name: DriverSums() for name in drivers}
-    about = {name: _mean_number(lots, name) for name in drivers}
-    seen = Counter(unit for lot in lots for unit in lot.units) if UNIT in out else Counter[str]()
+    noise = _noise(lots, means)
+    out = {name: DriverSums(name, lots) for name in drivers}
+    seen = Counter(unit for lot in (*lots, *compared) for unit in lot.units) if UNIT in out else Counter[str]()
     for lot in lots:
-        _gather(lot, out, means[lot.station], (noise, within), about, seen)
-    return {name: sums for name, sums in out.items() if sums.levels}
-
-
-def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
-    """Mean of a numerical driver over the lots that have it; zero if none has."""
-    values = [
-        lot.day if name == DATE else float(lot.numbers[name].mean())
-        for lot in lots
-        if name == DATE or name in lot.numbers
-    ]
-    return float(np.nanmean(values)) if values else 0.0
-
-
-def shrinkage(size: Array, information: Array) -> Array:
-    """Factors (p,) for shrinking the sizes (levels, p) towards zero: the share of their variance that is not noise."""
-    noise = over(np.ones_like(information), information).sum(axis=0)
-    return np.clip(1.0 - noise / np.maximum((size**2).sum(axis=0), 1e-300), 0.0, 1.0)
-
-
-def weights_of(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
-    """Weight of each level in each unit, (units, levels): 1 or 0, or a numerical driver's value about its origin."""
-    units = len(lot.units)
-    out = np.zeros((units, len(sums.labels)))
-    if driver == MEAN:
-        out[:] = 1.0
-    elif driver == DATE or driver in lot.numbers:
-        numbers = np.full(units, lot.day) if driver == DATE else lot.numbers[driver]
-        out[:, 0] = np.where(np.isfinite(numbers), numbers - sums.about, 0.0)
-    else:
-        labels = (lot.station,) * units if driver == STATION else lot.levels.get(driver, ())
-        column = {label: k for k, label in enumerate(sums.labels)}
-        for unit, label in enumerate(labels):
-            if label in column:
-                out[unit, column[label]] = 1.0
-    return out
-
-
-def about_common(driver: str, sums: DriverSums) -> Array:
-    """Scores (g, h) of levels; for a driver judged within lots only, about the mean over all levels."""
-    if driver not in INSIDE_ONLY or len(sums.labels) < 2:
-        return sums.score
-    total = sums.information.sum(axis=0)
-    mean = sums.score.sum(axis=0) / np.where(total > 0.0, total, 1.0)
-    return sums.score - sums.information * mean
+        for sums in out.values():
+            sums.gather(lot, means[lot.station], noise, seen)
+    return {name: sums for name, sums in out.items() if sums.labels}
 
 
 def _station_means(lots: Sequence[ScoredLot]) -> dict[str, Array]:
     """Mean size (h,) over each station's lots, by station."""
-    score, info = dict[str, Array](), dict[str, Array]()
+    sums = dict[str, Array]()
     for lot in lots:
-        zero = np.zeros(lot.information.size)
-        score[lot.station] = score.get(lot.station, zero) + np.where(lot.information > 0.0, lot.score.sum(axis=0), 0.0)
-        info[lot.station] = info.get(lot.station, zero) + lot.information
-    return {station: score[station] / np.where(info[station] > 0.0, info[station], 1.0) for station in score}
+        of_lot = np.stack([np.where(lot.information > 0.0, lot.score.sum(axis=0), 0.0), lot.information])
+        sums[lot.station] = sums.get(lot.station, np.zeros_like(of_lot)) + of_lot
+    return {station: over(*of_station) for station, of_station in sums.items()}
 
 
 def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float, float]:
@@ -136,56 +142,3 @@ def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float
         many = np.nanmedian(np.clip(np.array(between), 0.0, np.nanquantile(between, 0.99)), axis=0) / NORMAL_MEDIAN**2
         few = np.nanmedian(np.array(within), axis=0)
     return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))
-
-
-def _gather(
-    lot: ScoredLot,
-    out: Mapping[str, DriverSums],
-    mean: Array,
-    scale: tuple[float, float],
-    about: Mapping[str, float],
-    seen: Mapping[str, int],
-) -> None:
-    """Add a lot to the sums of drivers; ``scale``: as of :func:`_noise`, ``seen``: lots of each unit, which must be several."""
-    noise, within = scale
-    by_unit, total, info, left = lot.own, lot.total, lot.information, lot.inside[0]
-    sums = np.where(info > 0.0, lot.score.sum(axis=0), 0.0)
-    units = len(lot.units)
-    for name, of in out.items():
-        if name == MEAN:
-            of.add("all", sums / noise, info / noise, units)
-        elif name == STATION:
-            of.add(lot.station, sums / noise, info / noise, units)
-        elif name == DATE or name in lot.numbers:
-            numbers = np.full(units, lot.day) if name == DATE else lot.numbers[name]
-            of.about = about[name]
-            _gather_number(of, numbers - about[name], (lot, left, mean, noise, within))
-        elif name == UNIT or name in lot.levels:
-            labels = lot.units if name == UNIT else lot.levels[name]
-            for label in dict.fromkeys(labels):
-                here = np.array([other == label for other in labels])
-                of_level = by_unit[here].sum(axis=0)
-                score = left[here].sum(axis=0) / within
-                information = of_level * (1.0 - of_level / total) / within
-                of.inside += float(information.sum())
-                if name not in INSIDE_ONLY:  # add the information of the lot's mean
-                    share = of_level / total
-                    score = score + share * sums / noise
-                    common = share**2 * info / noise
-                    information = information + common
-                    of.between += float(common.sum())
-                if label and (name != UNIT or seen[label] > 1):
-                    of.add(label, score, information, int(here.sum()))
-
-
-def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array, Array, float, float]) -> None:
-    """Add a lot to the regression on a number, (units,) about its origin; parts: lot, scores in it, station mean, noise."""
-    lot, left, mean, noise, within = parts
-    if not np.isfinite(numbers).all():
-        return
-    by_unit, centre = lot.own, float(numbers.mean())
-    about = numbers[:, None] - lot.averaged(numbers[:, None])
-    score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
-    inside, between = (about**2 * by_unit).sum(axis=0) / within, centre**2 * lot.information / noise
-    of.inside, of.between = of.inside + float(inside.sum()), of.between + float(between.sum())
-    of.add("slope", score, inside + between, len(lot.units))

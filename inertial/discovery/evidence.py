@@ -13,12 +13,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtr
 
-from inertial.arrays import NORMAL_MEDIAN, Array, Flags, Places
+from inertial.arrays import NORMAL_MEDIAN, Array, Flags, Places, over
 from inertial.discovery.running_sums import BOUND, FIRST, Levels, Scale, Sums
-from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander, over
+from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander
 
 SHRUNK = 4.0
 """Prior information, in typical lots, that shrinks the predicted size of a level towards zero."""
@@ -60,6 +59,15 @@ class ScoredLot:
     numbers: Mapping[str, Array] = field(default_factory=dict[str, Array])
     slopes: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
+    def labels(self, driver: str) -> tuple[str, ...]:
+        """Label of each unit by a driver; none for a driver that this lot does not know or that is a number."""
+        always = {MEAN: (ALL,) * len(self.units), STATION: (self.station,) * len(self.units), UNIT: self.units}
+        return always[driver] if driver in always else self.levels.get(driver, ())
+
+    def number(self, driver: str) -> Array | None:
+        """Number of each unit, (units,), by a driver; None for labels."""
+        return np.full(len(self.units), self.day) if driver == DATE else self.numbers.get(driver)
+
     @cached_property
     def total(self) -> Array:
         """Information summed over the units, (h,), before elimination of the station's errors; never zero."""
@@ -81,7 +89,8 @@ class Evidence:
     Parameters
     ----------
     count : number of hypotheses, h = axes × columns of effects
-    earlier : function of unit and n: summed scores and information (h,) of the unit within the first n lots; None if unmeasured
+    earlier : function of unit and n: summed scores and information (h,) of the unit within the first n lots; None if unmeasured;
+        without it units are not judged
     columns : (k,), index of the effect of each column; None: no effects with several columns
     """
 
@@ -98,7 +107,6 @@ class Evidence:
         self.levels: dict[str, Levels] = {}
         self.wander = Wander(count)
         self.score, self.information = np.zeros(count), np.zeros(count)
-        self._units: dict[str, tuple[Array, Array]] = {}
         self._earlier = earlier
         self._held: list[ScoredLot] = []
         self._scales: dict[str, Scale] = {}
@@ -141,12 +149,9 @@ class Evidence:
         table, count = self.levels.get(STATION), len(self.wander.stations)
         if table is None or count < 2 or "between" not in self._scales:
             return np.zeros(self.count, dtype=bool)
-        n = len(table.place)
-        information = table.information[:n]
-        seen = information > 0.0
-        safe = np.where(seen, information, 1.0)
-        size = np.where(seen, table.score[:n] / safe, 0.0)
-        noise = self._scales["between"].rms ** 2 * np.mean(1.0 / safe, axis=0)
+        n, information = len(table.place), table.information
+        seen, size = information > 0.0, over(table.score, information)
+        noise = self._scales["between"].rms ** 2 * np.mean(1.0 / np.where(seen, information, 1.0), axis=0)
         ratio = size.mean(axis=0) ** 2 / np.maximum(size.var(axis=0), noise)
         odds = 0.5 * n * np.log1p(ratio)
         p = np.where(seen.all(axis=0), 2.0 * stdtr(n - 1, -np.sqrt((n - 1) * ratio)), 1.0)
@@ -156,19 +161,20 @@ class Evidence:
 
     def _begin(self) -> None:
         """Initialise the scales from medians of the first lots, then add these lots in their order."""
-        seen = np.array([lot.information > 0.0 for lot in self._held])
-        info = np.array([np.where(lot.information > 0.0, lot.information, 1.0) for lot in self._held])
-        z = np.where(seen, np.array([lot.score.sum(axis=0) for lot in self._held]) / np.sqrt(info), np.nan)
-        with np.errstate(all="ignore"):
-            there = seen.any(axis=0)
-            centre = np.where(there, np.nanmedian(np.where(there, z, 0.0), axis=0), 0.0)
-            spread = np.nanmedian(np.abs(np.where(there, z, 0.0) - centre), axis=0) / NORMAL_MEDIAN
-        start = np.where(there & (spread > 0.0), spread, 1.0)
+        info = np.array([lot.information for lot in self._held])
+        there = (info > 0.0).any(axis=0)
+        z = np.array([over(lot.score.sum(axis=0), np.sqrt(lot.information)) for lot in self._held])
+        z = np.where((info > 0.0) | ~there, z, np.nan)
+        centre = np.nanmedian(z, axis=0)
+        spread = np.nanmedian(np.abs(z - centre), axis=0) / NORMAL_MEDIAN
         about_zero = np.where(there, np.hypot(spread, centre), 1.0)
-        self._scales = {"between": Scale(start), "mean": Scale(np.where(about_zero > 0.0, about_zero, 1.0))}
-        self._scales |= {"inside": Scale(np.ones(self.count))}
-        known = np.where(there, np.mean(np.where(seen, info, 0.0), axis=0), 0.0)
-        self.score, self.information = known * centre / np.sqrt(np.where(known > 0.0, known, 1.0)), known.copy()
+        self._scales = {
+            "between": Scale(np.where(spread > 0.0, spread, 1.0)),
+            "mean": Scale(np.where(about_zero > 0.0, about_zero, 1.0)),
+            "inside": Scale(np.ones(self.count)),
+        }
+        self.information = np.mean(info, axis=0)
+        self.score = self.information * over(centre, np.sqrt(self.information))
         held, self._held = self._held, []
         for lot in held:
             self._add(lot)
@@ -178,30 +184,18 @@ class Evidence:
 
     def _add(self, lot: ScoredLot) -> None:
         total, info = lot.score.sum(axis=0), lot.information
-        seen = info > 0.0
-        safe = np.where(seen, info, 1.0)
-        size = np.where(seen, total / safe, 0.0)
-        found = self.wander.innovation(lot.station, size, info)
+        size = over(total, info)
         between = self._scales["between"]
-        rms = between.rms
-        self._mean(np.where(seen, total / np.sqrt(safe), 0.0))
-        self._stations(lot, size, safe, seen)
+        found = self.wander.innovation(lot.station, size, info, between.rms)
+        self._sums(MEAN, two_sided=True).add(self._scales["mean"].standardised(over(total, np.sqrt(info))))
+        self._stations(lot, size)
         self._between(lot, found)
         self._inside(lot)
-        self.wander.update(lot.station, size, info, found, rms)
+        self.wander.update(found)
         between.add(between.bounded(found.value))
-        # the mean is updated with the bounded deviation, so that a bad lot has limited influence on it
-        centre = self._centre()
-        left = self._scales["between"].bounded(np.where(seen, (size - centre) * np.sqrt(safe), 0.0))
-        self.score += np.where(seen, centre * safe + left * np.sqrt(safe), 0.0)
+        self.score += self._limited(size, info)[1]
         self.information += info
         self._taken += 1
-
-    def _mean(self, z: Array) -> None:
-        scale = self._scales["mean"]
-        bounded = scale.bounded(z)
-        self._sums(MEAN, two_sided=True).add(bounded / scale.rms)
-        scale.add(bounded)
 
     @property
     def _typical(self) -> Array:
@@ -211,28 +205,31 @@ class Evidence:
     def _centre(self) -> Array:
         return self.score / np.maximum(self.information, 1e-300)
 
-    def _stations(self, lot: ScoredLot, size: Array, safe: Array, seen: Flags) -> None:
+    def _limited(self, size: Array, information: Array) -> tuple[Array, Array]:
+        """Bounded deviation of a lot from the mean, and its score with it, so that a bad lot has limited influence, (h,) each."""
+        centre, root = self._centre(), np.sqrt(information)
+        left = self._scales["between"].bounded((size - centre) * root)
+        return left, centre * information + left * root
+
+    def _stations(self, lot: ScoredLot, size: Array) -> None:
         """Add evidence of permanent differences between stations: each lot against its station's earlier lots."""
         table = self.levels.setdefault(STATION, Levels(self.count))
-        prior, centre = SHRUNK * self._typical, self._centre()
+        prior, rms = SHRUNK * self._typical, self._scales["between"].rms
         (of_station,), (behind,) = table.predicted((lot.station,), prior)
-        predicted = of_station - centre * over(behind, behind + prior)
-        scale = self._scales["between"]
-        left = scale.bounded(np.where(seen, (size - centre) * np.sqrt(safe), 0.0))
-        x = left / scale.rms * np.clip(predicted * np.sqrt(safe) / scale.rms, -BOUND, BOUND)
-        self._sums(STATION, two_sided=False).add(np.where(seen, x, 0.0))
-        score = np.where(seen, centre * safe + left * np.sqrt(safe), 0.0)
-        table.add((lot.station,), score[None], np.where(seen, safe, 0.0)[None])
+        predicted = of_station - self._centre() * over(behind, behind + prior)
+        left, score = self._limited(size, lot.information)
+        x = left / rms * np.clip(predicted * np.sqrt(lot.information) / rms, -BOUND, BOUND)
+        self._sums(STATION, two_sided=False).add(x)
+        table.add((lot.station,), score[None], lot.information[None])
 
     def _between(self, lot: ScoredLot, found: Innovation) -> None:
         """Add evidence of drivers that may be constant within a lot, by the innovations of the station's filter.
 
         A level is predicted by lots of other stations, if there are any, so that the wander of a station does not count.
         """
-        scale, prior = self._scales["between"], SHRUNK * self._typical
-        rms, by_unit, ratio = scale.rms, lot.own, lot.information / lot.total
+        rms, by_unit, ratio, prior = found.rms, lot.own, lot.information / lot.total, SHRUNK * self._typical
         raw = np.abs(found.value)
-        part = np.where(raw > 0.0, np.minimum(1.0, BOUND * rms / np.where(raw > 0.0, raw, 1.0)), 1.0)
+        part = np.where(raw > BOUND * rms, over(BOUND * rms, raw), 1.0)
         for name, labels in lot.levels.items():
             if name in {SLOT, UNIT} or not any(labels):
                 continue
@@ -241,8 +238,8 @@ class Evidence:
             elsewhere = here if len(self.wander.stations) > 1 else None
             each, behind = table.predicted(labels, prior, elsewhere)
             prediction, told = lot.averaged(each), lot.averaged(behind) >= prior
-            value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, told)
-            self._sums(name, two_sided=False).add(scale.bounded(value) / rms * np.clip(left / rms, -BOUND, BOUND))
+            value, left = self.wander.beside_driver(name, prediction, found, told)
+            self._add_between(name, value, left / rms, two_sided=False)
             score = (lot.score - by_unit * ratio * self._centre()) * part
             for each_table in (table, here):
                 each_table.add(labels, score, by_unit * ratio)
@@ -252,9 +249,14 @@ class Evidence:
             if standardised is None:
                 continue
             prediction = np.full(self.count, standardised)
-            value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, found.known)
-            weight = np.clip(left / np.sqrt(np.maximum(self._typical, 1e-300)), -BOUND, BOUND)
-            self._sums(name, two_sided=True).add(scale.bounded(value) / rms * weight)
+            value, left = self.wander.beside_driver(name, prediction, found, found.known)
+            self._add_between(name, value, left / np.sqrt(np.maximum(self._typical, 1e-300)), two_sided=True)
+
+    def _add_between(self, name: str, value: Array, predicted: Array, *, two_sided: bool) -> None:
+        """Add the agreement of an innovation with a driver's prediction, (h,) each, to the sums of the driver."""
+        scale = self._scales["between"]
+        x = scale.bounded(value) / scale.rms * np.clip(predicted, -BOUND, BOUND)
+        self._sums(name, two_sided=two_sided).add(x)
 
     def _standardised(self, name: str, value: float) -> float | None:
         """A lot's value of a driver less the mean of earlier ones, over their standard deviation; None for the first three."""
@@ -272,7 +274,8 @@ class Evidence:
         scale, typical = self._scales["inside"], self._typical
         limit = BOUND * scale.rms * root
         left = np.clip(free, -limit, limit)
-        for name, labels in {**lot.levels, UNIT: lot.units}.items():
+        units = {} if self._earlier is None else {UNIT: lot.units}
+        for name, labels in {**lot.levels, **units}.items():
             if not any(labels):
                 continue
             inside = name if name in {SLOT, UNIT} else name + INSIDE
@@ -282,91 +285,66 @@ class Evidence:
                 table = self.levels.setdefault(inside, Levels(self.count))
                 predicted = table.predicted(labels, SHRUNK / len(labels) * typical)[0]
             if len(set(labels)) > 1:
-                self._add_inside(inside, lot, predicted, left, two_sided=False)
+                self._add_inside(inside, lot, predicted - lot.averaged(predicted), left, two_sided=False)
             if name != UNIT:
                 alike = np.array([by_unit[[other == label for other in labels]].sum(axis=0) for label in labels])
                 self.levels[inside].add(labels, left, by_unit * (1.0 - alike / lot.total))
-        for name, numbers in lot.numbers.items():
-            if np.isfinite(numbers).all() and float(np.ptp(numbers)) > 0.0:
-                predicted = np.broadcast_to(numbers[:, None], by_unit.shape)
-                self._add_inside(name + INSIDE, lot, predicted, left, two_sided=True)
-        self._slopes(lot, left)
-        scale.add(np.sqrt(np.mean(over(left, root) ** 2, axis=0)))
-        if self._earlier is None:
-            for unit, *sums in zip(lot.units, left, information, strict=True):
-                score, known = self._units.get(unit, (0.0, 0.0))
-                self._units[unit] = score + sums[0], known + sums[1]
-
-    def _slopes(self, lot: ScoredLot, left: Array) -> None:
-        """Add evidence of numbers that also differ by axis, and the sums for the estimates of their slopes."""
-        for name, numbers in lot.slopes.items():
-            about = numbers - lot.averaged(numbers)
-            if np.isfinite(about).all() and about.any():
-                self._add_inside(name + INSIDE, lot, numbers, left, two_sided=True)
+        for name, numbers in {
+            **{name: of_units[:, None] for name, of_units in lot.numbers.items()},
+            **lot.slopes,
+        }.items():
+            if np.isfinite(numbers).all() and np.ptp(numbers, axis=0).any():
+                about = numbers - lot.averaged(numbers)
+                self._add_inside(name + INSIDE, lot, about, left, two_sided=True)
+                # for the estimate of the slope
                 sums = np.stack([(left * about).sum(axis=0), np.zeros(self.count)])
-                squares = np.stack([(lot.own * about**2).sum(axis=0), lot.own.sum(axis=0)])
+                squares = np.stack([(by_unit * about**2).sum(axis=0), by_unit.sum(axis=0)])
                 self.levels.setdefault(name + INSIDE, Levels(self.count)).add((SLOPE, ALL), sums, squares)
+        scale.add(np.sqrt(np.mean(over(left, root) ** 2, axis=0)))
 
-    def _add_inside(self, name: str, lot: ScoredLot, predicted: Array, left: Array, *, two_sided: bool) -> None:
-        """Add the agreement of scores ``left`` with predicted sizes, (units, h) each, to the sums of a driver."""
-        about = predicted - lot.averaged(predicted)
+    def _add_inside(self, name: str, lot: ScoredLot, about: Array, left: Array, *, two_sided: bool) -> None:
+        """Add the agreement of scores ``left`` with predicted sizes about their mean, (units, h) each, to a driver's sums."""
         size = np.sqrt((lot.own * about**2).sum(axis=0))
         scale = self._scales["inside"]
-        rms = scale.rms
-        x = scale.bounded(over((left * about).sum(axis=0), size)) / rms
-        self._sums(name, two_sided=two_sided).add(x if two_sided else x * np.minimum(size / rms, BOUND))
+        x = scale.bounded(over((left * about).sum(axis=0), size)) / scale.rms
+        self._sums(name, two_sided=two_sided).add(x if two_sided else x * np.minimum(size / scale.rms, BOUND))
 
     def _of_units(self, units: tuple[str, ...]) -> Array:
         """Sizes (units, h) of the units in their earlier lots; zero for a unit measured for the first time."""
-        out = np.zeros((len(units), self.count))
-        for row, unit in enumerate(units):
-            before = self._units.get(unit) if self._earlier is None else self._earlier(unit, self._taken)
-            if before is not None:
-                out[row] = over(*before)
-        return out
+        before = (None if self._earlier is None else self._earlier(unit, self._taken) for unit in units)
+        return np.array([np.zeros(self.count) if of_unit is None else over(*of_unit) for of_unit in before])
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """The state as named arrays, for :meth:`restored`."""
-        out: dict[str, NDArray[Any]] = {"score": self.score, "information": self.information}
-        out["counts"] = np.array([self.lots, self._taken], dtype=np.float64)
-        for name, sums in self.drivers.items():
-            out[f"driver/{name}"] = np.stack([sums.s, sums.v, np.full(self.size, float(sums.two_sided))])
-        for name, levels in self.levels.items():
-            n = len(levels.place)
-            out[f"levels/{name}"] = np.stack([levels.score[:n], levels.information[:n]])
-            out[f"labels/{name}"] = np.array(list(levels.place), dtype=np.str_)
-        for name, scale in self._scales.items():
-            out[f"scale/{name}"] = np.stack([scale.squares, scale.n])
-        for name, values in self._numbers.items():
-            out[f"number/{name}"] = np.array(values)
-        return out | {f"wander/{name}": value for name, value in self.wander.arrays().items()}
+    def arrays(self) -> dict[str, Any]:
+        """The state as nested arrays, for :meth:`restored`."""
+        flags = {name: np.full(self.size, float(sums.two_sided)) for name, sums in self.drivers.items()}
+        return {
+            "sums": np.stack([self.score, self.information]),
+            "counts": np.array([self.lots, self._taken]),
+            "drivers": {name: np.stack([sums.s, sums.v, flags[name]]) for name, sums in self.drivers.items()},
+            "levels": {name: levels.arrays() for name, levels in self.levels.items()},
+            "scales": {name: scale.sums for name, scale in self._scales.items()},
+            "numbers": {name: np.array(values) for name, values in self._numbers.items()},
+            "wander": self.wander.arrays(),
+        }
 
     @classmethod
     def restored(
         cls,
         count: int,
-        arrays: Mapping[str, NDArray[Any]],
-        earlier: Callable[[str, int], tuple[Array, Array] | None],
+        arrays: Mapping[str, Any],
+        earlier: Callable[[str, int], tuple[Array, Array] | None] | None = None,
         columns: Places | None = None,
     ) -> "Evidence":
         """The evidence with the state of :meth:`arrays`."""
         new = cls(count, earlier, columns)
-        new.score, new.information = arrays["score"].copy(), arrays["information"].copy()
-        new.lots, new._taken = (int(value) for value in arrays["counts"])
-        for key, value in arrays.items():
-            kind, _, name = key.partition("/")
-            if kind == "driver":
-                new.drivers[name] = Sums(*value[:2].copy(), two_sided=bool(value[2].any()), effects=new.effects)
-            elif kind == "levels":
-                levels = new.levels[name] = Levels(count)
-                levels.score, levels.information = value.copy()
-                levels.place = {str(label): at for at, label in enumerate(arrays[f"labels/{name}"])}
-            elif kind == "scale":
-                scale = new._scales[name] = Scale(np.ones(count))
-                scale.squares, scale.n = value.copy()
-            elif kind == "number":
-                new._numbers[name] = (float(value[0]), float(value[1]), float(value[2]))
-        new.wander.restore(
-            {key.removeprefix("wander/"): value for key, value in arrays.items() if key.startswith("wander/")}
-        )
+        new.score, new.information = arrays["sums"].copy()
+        new.lots, new._taken = arrays["counts"].tolist()
+        for name, value in arrays.get("drivers", {}).items():
+            new.drivers[name] = Sums(*value[:2].copy(), two_sided=bool(value[2].any()), effects=new.effects)
+        new.levels = {name: Levels.restored(value) for name, value in arrays.get("levels", {}).items()}
+        for name, value in arrays.get("scales", {}).items():
+            new._scales[name] = Scale(np.ones(count))
+            new._scales[name].sums = value.copy()
+        new._numbers = {name: tuple(value.tolist()) for name, value in arrays.get("numbers", {}).items()}
+        new.wander = Wander.restored(arrays["wander"])
         return new

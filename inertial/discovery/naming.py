@@ -13,12 +13,12 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from inertial import effects as effects_catalogue
-from inertial.arrays import Array, Places
+from inertial.arrays import Array, Places, over
 from inertial.decisions import CLASS_WIDTH
-from inertial.discovery.driver_sums import INSIDE_ONLY, DriverSums, about_common, gathered, shrinkage, weights_of
+from inertial.discovery.driver_sums import DriverSums, gathered
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
 from inertial.discovery.pose_shape import SHAPE
-from inertial.discovery.station_wander import over
+from inertial.discovery.scores import Products, correlations_of
 
 _MOST = 6
 """Largest number of names of one evaluation."""
@@ -47,6 +47,10 @@ A second effect of the same driver below half of the size of the first is named 
 """
 
 
+Scores = dict[tuple[str, str], float]
+"""Scores of pairs of driver and effect."""
+
+
 @dataclass(frozen=True)
 class Name:
     """An effect found in an archive, with its driver.
@@ -62,6 +66,27 @@ class Name:
     sizes: Array
     errors: Array
     score: float
+
+    def by_axis(self) -> list[float]:
+        """Rms size of each axis over the levels, g, corrected for noise."""
+        weight, _, squares = self._squares()
+        return np.sqrt(np.maximum((weight * squares).sum(axis=0), 0.0)).tolist()
+
+    def size(self) -> tuple[float, float, float]:
+        """Rms size over levels and axes, and the ends of its 95 % interval, g."""
+        weight, errors, squares = self._squares()
+        each = weight / 3.0
+        mean = float((each * squares).sum())
+        spread = 2.0 * float(np.sqrt((each**2 * (4.0 * self.sizes**2 * errors**2 + 2.0 * errors**4)).sum()))
+        size, low, high = np.sqrt(np.maximum([mean, mean - spread, mean + spread], 0.0)).tolist()
+        return size, low, high
+
+    def _squares(self) -> tuple[Array, Array, Array]:
+        """Weights of the levels (n, 1); standard errors (zero if unknown), g, and squares less noise, g², of the sizes."""
+        finite = np.isfinite(self.errors)
+        errors = np.where(finite, self.errors, 0.0)
+        weight = self.weights / max(float(self.weights.sum()), 1e-300)
+        return weight[:, None], errors, np.where(finite, self.sizes**2 - errors**2, 0.0)
 
 
 @dataclass(frozen=True)
@@ -80,19 +105,11 @@ class Unnamed:
 
 
 class Pool:
-    """All lots of an archive, gathered for some drivers.
+    """All lots of an archive, gathered for some drivers; hypotheses are axes × columns."""
 
-    Parameters
-    ----------
-    columns : (k,), effect and index of its column; hypotheses are axes × columns
-    size : (h,), g, rms in a dwell of a coefficient of one
-    lot : (h, h), products of the columns for sums over a lot's units · inside : (axes, k, k), for differences within a lot
-    """
-
-    def __init__(self, columns: Sequence[tuple[str, int]], size: Array, lot: Array, inside: Array) -> None:
-        self.columns, self.size = tuple(columns), size
-        self.lot, self.inside = _correlation(lot), _correlation(inside)
-        self.axes = len(inside)
+    def __init__(self, products: Products) -> None:
+        self.columns, self.size, self.axes = products.columns, products.size, len(products.inside)
+        self.lot, self.inside = correlations_of(products.lot), correlations_of(products.inside)
 
     def names(
         self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float
@@ -107,27 +124,19 @@ class Pool:
         alarmed = {(name.removesuffix(INSIDE), effect) for name, effect in alarms}
         drivers = list(dict.fromkeys(name for name, _ in sorted(alarmed)))
         found, every = list[Name](), lots
-        of_pose: list[
-            dict[str, float]
-        ] = []  # score of any function of pose by driver, before each name and after the last
+        of_pose: list[Scores] = []  # scores of any function of pose by driver, before each name and after the last
         while True:
-            sums = gathered(lots, drivers)
-            scores = {name: self.scores(name, of) for name, of in sums.items()}
-            significance = self._cross_validated(lots, list(sums))
-            of_pose.append({name: of.get(SHAPE, 0.0) for name, of in scores.items()})
+            sums, scores, significant = self._judged(lots, drivers, needed)
+            of_pose.append({pair: score for pair, score in scores.items() if pair[1] == SHAPE})
             pairs = [
-                (score, name, effect)
-                for name, of in scores.items()
-                for effect, score in of.items()
-                if effect != SHAPE
-                and score > needed
-                and significance[name][effect] > np.sqrt(2.0 * needed)
+                (scores[pair], *pair)
+                for pair in significant
+                if pair[1] != SHAPE
                 # a remainder of other names is named only if it had an alarm itself and a clearly higher score
-                and (not found or ((name, effect) in alarmed and score > needed + CLASS_WIDTH))
+                and (not found or (pair in alarmed and scores[pair] > needed + CLASS_WIDTH))
             ]
-            name = next(
-                (named for named in self._in_order(pairs, sums, scores) if not self._already_named(found, named)), None
-            )
+            new = (name for name in self._in_order(pairs, sums, scores) if not self._already_named(found, name))
+            name = next(new, None)
             if name is None or len(found) == _MOST:
                 break
             found.append(name)
@@ -147,33 +156,51 @@ class Pool:
         out: list[Unnamed] = []
         least = max([needed, *(_REMAINDER * name.score for name in names)])
         while SHAPE in self.effects and len(out) < _MOST:
-            sums = gathered(lots, drivers)
-            significance = self._cross_validated(lots, list(sums))
-            scores = {driver: self.scores(driver, of)[SHAPE] for driver, of in sums.items()}
-            left = [driver for driver in scores if significance[driver][SHAPE] > np.sqrt(2.0 * needed)]
-            best = max(left, key=lambda driver: scores[driver], default=None)
-            if best is None or scores[best] <= least or best in {unnamed.driver for unnamed in out}:
+            sums, scores, significant = self._judged(lots, drivers, needed)
+            best = max((pair for pair in significant if pair[1] == SHAPE), key=lambda pair: scores[pair], default=None)
+            if best is None or scores[best] <= least or best[0] in {unnamed.driver for unnamed in out}:
                 break
-            out.append(self._shape(best, sums[best], scores[best]))
+            out.append(self._shape(sums[best[0]], scores[best]))
             least = max(least, _REMAINDER * scores[best])
-            lots = self._subtracted(lots, best, SHAPE)
+            lots = self._subtracted(lots, *best)
         return out
 
-    def _shape(self, driver: str, sums: DriverSums, score: float) -> Unnamed:
+    def _judged(
+        self, lots: Sequence[ScoredLot], drivers: Sequence[str], needed: float
+    ) -> tuple[dict[str, DriverSums], Scores, list[tuple[str, str]]]:
+        """Sums by driver, scores of all pairs of driver and effect, and the pairs that halves of the lots predict, too.
+
+        The significance, in standard deviations, with which they predict each other is normalised by the contributions of the
+        lots themselves, so that noise larger than stated does not raise it.
+        """
+        sums = gathered(lots, drivers)
+        scores = {(driver, effect): self.score(of, effect) for driver, of in sums.items() for effect in self.effects}
+        crossed = {driver: np.zeros((2, len(self.effects))) for driver in sums}
+        for driver, x in self._crossed(lots, list(sums)):
+            crossed[driver] += x, x**2
+        least = np.sqrt(2.0 * needed)
+        significant = [
+            (driver, effect)
+            for driver, (s, v) in crossed.items()
+            for effect, z in zip(self.effects, s / np.sqrt(np.maximum(v, 1e-300)), strict=True)
+            if z > least and scores[driver, effect] > needed
+        ]
+        return sums, scores, significant
+
+    def _shape(self, sums: DriverSums, score: float) -> Unnamed:
         """The dependence on pose of the level with the largest one."""
-        size, products = self._fitted(driver, SHAPE, sums)
+        size, products = self._fitted(sums, SHAPE)
         z = size / np.sqrt(np.maximum(np.diagonal(products, axis1=2, axis2=3), 1e-300))
         level = int(np.argmax(np.sum(z**2, axis=(0, 2))))
         label = sums.labels[level] if len(sums.labels) > 1 else ""
-        return Unnamed(driver, label, size[:, level], products[:, level], score)
+        return Unnamed(sums.driver, label, size[:, level], products[:, level], score)
 
-    def _fitted(self, driver: str, effect: str, sums: DriverSums) -> tuple[Array, Array]:
+    def _fitted(self, sums: DriverSums, effect: str) -> tuple[Array, Array]:
         """Sizes (axes, levels, p) of an effect's columns, fitted jointly per level, and covariances (axes, levels, p, p)."""
-        here, centred = self._everywhere(effect), about_common(driver, sums)
-        inner = self._inner(sums, effect)
+        here, inner = self.everywhere(effect), self._inner(sums, effect)
         root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
-        scale = over(np.ones_like(root), root)
-        sizes = scale * (over(centred[:, here], root) @ inner)
+        scale = over(1.0, root)
+        sizes = scale * (over(sums.centred[:, here], root) @ inner)
         covariance = (scale[:, :, None] * inner * scale[:, None, :]).reshape(
             len(root), self.axes, -1, self.axes, here.size // self.axes
         )
@@ -181,17 +208,13 @@ class Pool:
         return np.moveaxis(sizes.reshape(len(root), self.axes, -1), 1, 0), covariances
 
     def _in_order(
-        self,
-        pairs: Sequence[tuple[float, str, str]],
-        sums: Mapping[str, DriverSums],
-        scores: Mapping[str, Mapping[str, float]],
+        self, pairs: Sequence[tuple[float, str, str]], sums: Mapping[str, DriverSums], scores: Scores
     ) -> Iterator[Name]:
         """Pairs of score, driver and effect as names, the best first."""
         for top, best, effect in sorted(pairs, reverse=True):
             # an effect that differs by level has a nonzero mean, too: such a driver is preferred to the mean
             same = (n for score, n, other in pairs if other == effect and n != MEAN and score > top - CLASS_WIDTH)
-            driver = next(same, best)
-            yield self._name(driver, sums[driver], effect, scores)
+            yield self._name(sums[next(same, best)], effect, scores)
 
     def _already_named(self, found: Sequence[Name], new: Name) -> bool:
         """Whether a name repeats an earlier one, or is the remainder of one whose column is not exactly that of its effect."""
@@ -199,7 +222,7 @@ class Pool:
         for name in found:
             inexact = effects_catalogue.get(name.effects[0]).nonlinear
             little = new.score < (_REMAINDER_OF_SHAPE if inexact else _REMAINDER) * name.score
-            cosines = self.lot[np.ix_(self._everywhere(effect), self._everywhere(name.effects[0]))]
+            cosines = self.lot[np.ix_(self.everywhere(effect), self.everywhere(name.effects[0]))]
             alike = set(new.effects) & set(name.effects) or np.abs(cosines).max() > _ALIKE
             if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):
                 return True
@@ -208,40 +231,24 @@ class Pool:
     def _subtracted(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
         """The lots with an effect of a driver subtracted, iterated because its columns and levels share lots."""
         for _ in range(_TURNS):
-            sums = gathered(lots, [driver])
-            if driver not in sums or self.scores(driver, sums[driver])[effect] < 1.0:
+            sums = gathered(lots, [driver]).get(driver)
+            if sums is None or self.score(sums, effect) < 1.0:
                 break
-            sizes = self._sizes(driver, effect, sums[driver])
-            lots = [self.without(lot, driver, effect, sums[driver], sizes) for lot in lots]
+            sizes, covariance = self._fitted(sums, effect)
+            if len(sums.labels) > 1:  # sizes of levels are shrunk towards zero according to their noise
+                noise = np.maximum(np.diagonal(covariance, axis1=2, axis2=3), 0.0).sum(axis=1)
+                share = 1.0 - noise / np.maximum((sizes**2).sum(axis=1), 1e-300)
+                sizes = sizes * np.clip(share, 0.0, 1.0)[:, None]
+            lots = [self.without(lot, sums, effect, sizes) for lot in lots]
         return lots
-
-    def _sizes(self, driver: str, effect: str, sums: DriverSums) -> Array:
-        """Sizes (axes, levels, p) of a driver's levels, shrunk towards zero according to their noise."""
-        size, covariance = self._fitted(driver, effect, sums)
-        if len(sums.labels) > 1:
-            known = np.diagonal(covariance, axis1=2, axis2=3)
-            size = np.stack([of * shrinkage(of, over(np.ones_like(c), c)) for of, c in zip(size, known, strict=True)])
-        return size
-
-    def _cross_validated(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, dict[str, float]]:
-        """Significance, in standard deviations, with which halves of the lots predict each other, by driver and effect.
-
-        It is normalised by the contributions of the lots themselves, so that noise larger than stated does not raise it.
-        """
-        total = {name: np.zeros((2, len(self.effects))) for name in drivers}
-        for name, x in self._crossed(lots, drivers):
-            total[name] += np.stack([x, x**2])
-        return {
-            name: dict(zip(self.effects, s / np.sqrt(np.maximum(v, 1e-300)), strict=True))
-            for name, (s, v) in total.items()
-        }
 
     def _crossed(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> Iterator[tuple[str, Array]]:
         """For each lot and driver, the product of the lot's scores and their prediction by the other half, (effects,)."""
-        halves = gathered(lots[0::2], drivers), gathered(lots[1::2], drivers)
+        parts = lots[0::2], lots[1::2]
+        halves = gathered(parts[0], drivers, parts[1]), gathered(parts[1], drivers, parts[0])
         for number, lot in enumerate(lots):
             for name, sums in halves[1 - number % 2].items():
-                yield name, self._of_effects(self._predicted(lot, name, sums))
+                yield name, self._predicted(lot, sums) @ self._sum_over
 
     def carried(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Array:
         """Contribution (n,) of each lot to the cross-validated evidence of an effect by a driver."""
@@ -255,25 +262,27 @@ class Pool:
 
         The part is one if the effect is confirmed; lots with new levels of the driver are not used.
         """
-        index, sums = self.effects.index(effect), gathered(before, [driver])
-        if driver not in sums:
+        sums = gathered(before, [driver], after).get(driver)
+        if sums is None:
             return float("nan"), float("inf"), 0
-        shown, expected = np.zeros((2, len(after)))
-        for number, lot in enumerate(after):
-            shown[number] = self._of_effects(self._predicted(lot, driver, sums[driver]))[index]
-            expected[number] = self._of_effects(self._expected(lot, driver, sums[driver]))[index]
+        both = np.array([(self._predicted(lot, sums), self._expected(lot, sums)) for lot in after])
+        shown, expected = (both @ self._sum_over)[..., self.effects.index(effect)].T
         able, total = int(np.count_nonzero(expected > 0.0)), float(expected.sum())
         if not able or total <= 0.0:
             return float("nan"), float("inf"), 0
         factor = float(shown.sum()) / total
         return factor, float(np.sqrt(np.sum((shown - factor * expected) ** 2))) / total, able
 
-    def _expected(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
+    def _predicted(self, lot: ScoredLot, sums: DriverSums) -> Array:
+        """Product (h,) of a lot's scores and the sizes that other lots predict, summed over its units."""
+        return ((lot.inside[0] if sums.inside_only else lot.score) * sums.predicted_sizes(lot)).sum(axis=0)
+
+    def _expected(self, lot: ScoredLot, sums: DriverSums) -> Array:
         """Expected value of :meth:`_predicted` if the prediction is true, (h,)."""
-        of_units = _of_units(lot, driver, sums)
+        of_units = sums.predicted_sizes(lot)
         common = lot.averaged(of_units)
         inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
-        return inside if driver in INSIDE_ONLY else inside + common**2 * lot.information
+        return inside if sums.inside_only else inside + common**2 * lot.information
 
     @cached_property
     def effects(self) -> list[str]:
@@ -286,22 +295,14 @@ class Pool:
         belongs = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
         return np.tile(belongs, (self.axes, 1))
 
-    def _of_effects(self, x: Array) -> Array:
-        return x @ self._sum_over
-
-    def _predicted(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
-        """Product (h,) of a lot's scores and the sizes that other lots predict, summed over its units."""
-        of_units = _of_units(lot, driver, sums)
-        return ((lot.inside[0] if driver in INSIDE_ONLY else lot.score) * of_units).sum(axis=0)
-
-    def without(self, lot: ScoredLot, driver: str, effect: str, sums: DriverSums, sizes: Array) -> ScoredLot:
+    def without(self, lot: ScoredLot, sums: DriverSums, effect: str, sizes: Array) -> ScoredLot:
         """A lot with an effect of sizes (axes, levels, p) subtracted from its sums; no dwell is read again."""
         at, count, units = self.places(effect), len(self.columns), len(lot.units)
-        weights = weights_of(lot, driver, sums)
+        weights = sums.weights(lot)
         if not weights.any():
             return lot
         score = lot.score.copy()
-        root, everywhere = np.sqrt(np.maximum(lot.information, 0.0)), self._everywhere(effect)
+        root, everywhere = np.sqrt(np.maximum(lot.information, 0.0)), self.everywhere(effect)
         in_common: list[Array] = []
         for axis in range(self.axes):
             here, every = axis * count + at, axis * count + np.arange(count)
@@ -322,7 +323,7 @@ class Pool:
         for axis in range(self.axes):
             every = axis * count + np.arange(count)
             left[:, every], by_unit[:, every] = _eliminated(left[:, every], by_unit[:, every], self.inside[axis], at)
-        of_sums = _eliminated(sums[None], information[None], self.lot, self._everywhere(effect))
+        of_sums = _eliminated(sums[None], information[None], self.lot, self.everywhere(effect))
         sums, information = (part[0] for part in of_sums)
         score = np.where(by_unit > 0.0, left + share * sums, 0.0)
         return replace(lot, score=score, own=by_unit, information=information)
@@ -331,7 +332,7 @@ class Pool:
         """Indices of the columns of an effect, (p,)."""
         return np.array([k for k, (name, _) in enumerate(self.columns) if name == effect], dtype=np.intp)
 
-    def _everywhere(self, effect: str) -> Places:
+    def everywhere(self, effect: str) -> Places:
         """Indices of the hypotheses of an effect, (axes·p,), axis by axis."""
         return (np.arange(self.axes)[:, None] * len(self.columns) + self.places(effect)).reshape(-1)
 
@@ -341,52 +342,44 @@ class Pool:
         Combinations that vanish beside errors of the station, or by rounding of the stored sums, are excluded: otherwise a large
         effect would seem to explain three times the actual chi-square.
         """
-        at, here = self.places(effect), self._everywhere(effect)
+        at, here = self.places(effect), self.everywhere(effect)
         if sums.mixed:
             among = np.asarray(block_diag(*self.inside[:, at[:, None], at]), dtype=np.float64)
         else:
             among = self.lot[np.ix_(here, here)]
         return np.linalg.pinv(among, rcond=_SEEN, hermitian=True).astype(np.float64)
 
-    def scores(self, name: str, sums: DriverSums) -> dict[str, float]:
-        """Score of every effect for a driver."""
-        out: dict[str, float] = {}
-        for effect in self.effects:
-            drop, rank = self._drop(name, sums, effect)
-            k = float(np.sum(rank) - (np.count_nonzero(rank) if name in INSIDE_ONLY else 0))
-            out[effect] = max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
-        return out
-
-    def _drop(self, name: str, sums: DriverSums, effect: str) -> tuple[float, Array]:
-        """Reduction of chi-square by an effect's columns, and the number of coefficients of each hypothesis."""
-        here = self._everywhere(effect)
+    def score(self, sums: DriverSums, effect: str) -> float:
+        """Score of an effect for a driver: the reduction of chi-square by its columns less the price of their coefficients."""
+        here = self.everywhere(effect)
         info = sums.information[:, here]
-        z = over(about_common(name, sums)[:, here], np.sqrt(np.maximum(info, 0.0)))
-        return float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
+        z = over(sums.centred[:, here], np.sqrt(np.maximum(info, 0.0)))
+        drop, rank = float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
+        k = float(np.sum(rank) - (np.count_nonzero(rank) if sums.inside_only else 0))
+        return max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
 
-    def _rank(self, effect: str, behind: float, top: float) -> tuple[bool, int, int, float]:
-        """Sort key in a class: among effects that inexact columns do not distinguish, the simplest is first."""
-        simplicity = effects_catalogue.get(effect).simplicity
-        return behind > _INEXACT * top, len(self.places(effect)), simplicity, behind
+    def _name(self, sums: DriverSums, effect: str, scores: Scores) -> Name:
+        driver, top = sums.driver, scores[sums.driver, effect]
 
-    def _name(self, driver: str, sums: DriverSums, effect: str, scores: Mapping[str, Mapping[str, float]]) -> Name:
-        count, top = len(self.columns), scores[driver][effect]
-        width = max(CLASS_WIDTH, _INEXACT * top)
-        effects = [rival for rival, score in scores[driver].items() if score > top - width and rival != SHAPE]
-        drivers = [name for name, of in scores.items() if of[effect] > top - CLASS_WIDTH]
-        effects.sort(key=lambda rival: self._rank(rival, top - scores[driver][rival], top))
-        drivers.sort(key=lambda other: (other != driver, -scores[other][effect]))
-        here = np.arange(self.axes) * count + self.places(effects[0])[0]
+        def rank(rival: str) -> tuple[bool, int, int, float]:
+            """Sort key in a class: among effects that inexact columns do not distinguish, the simplest is first."""
+            behind = top - scores[driver, rival]
+            simplicity = effects_catalogue.get(rival).simplicity
+            return behind > _INEXACT * top, len(self.places(rival)), simplicity, behind
+
+        least = top - max(CLASS_WIDTH, _INEXACT * top)
+        effects = sorted((e for e in self.effects if scores[driver, e] > least and e != SHAPE), key=rank)
+        drivers = [name for name, of in scores if of == effect and scores[name, of] > top - CLASS_WIDTH]
+        drivers.sort(key=lambda other: (other != driver, -scores[other, effect]))
+        here = self.everywhere(effects[0]).reshape(self.axes, -1)[:, 0]
         info = sums.information[:, here]
-        sizes = over(about_common(driver, sums)[:, here], info) * self.size[here]
-        errors = (
-            np.where(info > 0.0, over(np.ones_like(info), np.sqrt(np.maximum(info, 0.0))), np.inf) * self.size[here]
-        )
+        sizes = over(sums.centred[:, here], info) * self.size[here]
+        errors = np.where(info > 0.0, over(1.0, np.sqrt(np.maximum(info, 0.0))), np.inf) * self.size[here]
         weights = np.array(list(sums.units.values()), dtype=np.float64)
-        return Name(tuple(effects), tuple(drivers), tuple(sums.levels), weights, sizes, errors, top)
+        return Name(tuple(effects), tuple(drivers), tuple(sums.labels), weights, sizes, errors, top)
 
 
-def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], needed: float) -> set[int]:
+def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float) -> set[int]:
     """Indices of names that are parts of a function of pose outside the catalogue: together they explain less than it does.
 
     Parameters
@@ -395,7 +388,7 @@ def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], n
     """
     out: set[int] = set()
     for driver in {name.drivers[0] for name in names}:
-        before = [scores.get(driver, 0.0) for scores in of_pose]
+        before = [scores.get((driver, SHAPE), 0.0) for scores in of_pose]
         of_driver = [at for at, name in enumerate(names) if name.drivers[0] == driver]
         parts = [at for at in of_driver if before[at] - before[at + 1] > _OF_POSE * names[at].score]
         explained = sum(names[at].score for at in parts)
@@ -413,14 +406,3 @@ def _eliminated(values: Array, information: Array, products: Array, at: Places) 
     information = information * np.where(covered > 1.0 - _SEEN, 0.0, np.clip(1.0 - covered, 0.0, 1.0))
     values[:, at], information[:, at] = 0.0, 0.0
     return values, information
-
-
-def _of_units(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
-    """Sizes (units, h) that the sums of a driver predict for the units of a lot."""
-    return weights_of(lot, driver, sums) @ over(about_common(driver, sums), sums.information)
-
-
-def _correlation(products: Array) -> Array:
-    """Products (..., k, k) normalised to a unit diagonal; zero where the diagonal is zero."""
-    root = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 0.0))
-    return over(products, root[..., :, None] * root[..., None, :])

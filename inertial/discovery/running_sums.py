@@ -4,13 +4,15 @@ Each increment x is, given all earlier lots, symmetric about zero under the null
 V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from inertial.arrays import Array, Places
-from inertial.discovery.station_wander import over
+from inertial.arrays import Array, Places, over
 
 FIRST = 30
 """Number of lots held back until their medians limit the influence of each: a lot multiplies evidence by 1.65 at most."""
@@ -68,7 +70,21 @@ class Levels:
 
     def __init__(self, count: int) -> None:
         self.place: dict[str, int] = {}
-        self.score, self.information = np.zeros((0, count)), np.zeros((0, count))
+        self._sums = np.zeros((2, 0, count))
+
+    @property
+    def score(self) -> Array:
+        """Scores (levels, h)."""
+        return self._sums[0, : len(self.place)]
+
+    @property
+    def information(self) -> Array:
+        """Information (levels, h)."""
+        return self._sums[1, : len(self.place)]
+
+    def of(self, label: str) -> Array:
+        """Score and information of a level, (2, h); zero if unknown."""
+        return self._sums[:, self.place[label]] if label in self.place else np.zeros((2, self._sums.shape[2]))
 
     def predicted(self, labels: tuple[str, ...], prior: Array, without: "Levels | None" = None) -> tuple[Array, Array]:
         """Predicted sizes (units, h), shrunk towards zero by a prior information (h,), and their information (units, h).
@@ -77,16 +93,11 @@ class Levels:
         ----------
         without : sums of lots that are excluded from the prediction
         """
-        sizes, behind = np.zeros((2, len(labels), self.score.shape[1]))
+        sizes, behind = np.zeros((2, len(labels), prior.size))
         for unit, label in enumerate(labels):
-            at = self.place.get(label, -1)
-            if at < 0:
-                continue
-            score, information = self.score[at], self.information[at]
-            less = -1 if without is None else without.place.get(label, -1)
-            if without is not None and less >= 0:
-                score, information = score - without.score[less], information - without.information[less]
-            sizes[unit], behind[unit] = over(score, information + prior), information
+            if label in self.place:
+                sums = self.of(label) - (0.0 if without is None else without.of(label))
+                sizes[unit], behind[unit] = over(sums[0], sums[1] + prior), sums[1]
         return sizes, behind
 
     def add(self, labels: tuple[str, ...], score: Array, information: Array) -> None:
@@ -95,30 +106,46 @@ class Levels:
             if not label:
                 continue
             at = self.place.setdefault(label, len(self.place))
-            if at >= len(self.score):
-                more = np.zeros((max(16, len(self.score)), self.score.shape[1]))
-                self.score, self.information = np.vstack([self.score, more]), np.vstack([self.information, more])
-            self.score[at] += score[unit]
-            self.information[at] += information[unit]
+            if at >= self._sums.shape[1]:
+                more = np.zeros((2, max(16, at), self._sums.shape[2]))
+                self._sums = np.concatenate([self._sums, more], axis=1)
+            self._sums[:, at] += score[unit], information[unit]
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The labels, and the sums (2, levels, h), for :meth:`restored`."""
+        return {"labels": np.array(list(self.place), dtype=np.str_), "sums": self._sums[:, : len(self.place)]}
+
+    @classmethod
+    def restored(cls, arrays: Mapping[str, NDArray[Any]]) -> "Levels":
+        """The sums of :meth:`arrays`."""
+        new = cls(0)
+        new.place = {str(label): at for at, label in enumerate(arrays["labels"])}
+        new._sums = arrays["sums"].copy()
+        return new
 
 
 class Scale:
     """Root mean square of the earlier values, each clipped; it starts from a median of the first lots."""
 
     def __init__(self, start: Array) -> None:
-        self.squares, self.n = 10.0 * start**2, np.full(start.size, 10.0)
+        self.sums = np.stack([10.0 * start**2, np.full(start.size, 10.0)])  # Σx², n
 
     @property
     def rms(self) -> Array:
         """Root mean square (h,) of the values so far."""
-        return np.sqrt(self.squares / self.n)
+        return np.sqrt(self.sums[0] / self.sums[1])
 
     def bounded(self, value: Array) -> Array:
         """A value (h,) clipped to five standard deviations."""
         limit = BOUND * self.rms
         return np.clip(value, -limit, limit)
 
+    def standardised(self, value: Array) -> Array:
+        """A value (h,), clipped, over the root mean square of the earlier ones, which it joins."""
+        bounded, rms = self.bounded(value), self.rms
+        self.add(bounded)
+        return bounded / rms
+
     def add(self, value: Array) -> None:
         """Add a clipped value (h,); zeros are not counted."""
-        self.squares += value**2
-        self.n += value != 0.0
+        self.sums += value**2, value != 0.0

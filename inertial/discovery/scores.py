@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from inertial import effects as catalogue
-from inertial.arrays import Array
+from inertial.arrays import Array, over
 from inertial.criticism.drivers import forces_along
 from inertial.design import starting_values
 from inertial.discovery.pose_shape import COUNT, SHAPE, harmonics
@@ -26,6 +26,9 @@ from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
 from inertial.estimation.term import with_turn_on
 
+Column = tuple[str, int]
+"""An effect, and the index of one of its columns."""
+
 LEAST_LEFT = 0.05
 """Smallest share of an effect's information left after elimination of station errors; below it no lot can separate the two."""
 
@@ -36,31 +39,58 @@ _RIDGE = 1e-9
 
 
 @dataclass(frozen=True)
-class LotScores:
-    """Scores of a lot; coefficients in g per unit of the effect's column.
+class Products:
+    """Products of columns of coefficients in g per unit of the effect's column, as means over lots with equal columns.
 
     columns : (k,), effect and index of its column, of the sensor; station : (q,), the same of the station
-    axes : indices of the m measured axes
-    score : (units, m, k), errors of the station eliminated · own : (units, m, k), information before the elimination
-    lot : (m·k, m·k), information of the sums over the units after the elimination, which couples the axes
-    inside : (m, k, k), mean information of a unit before the elimination
-    station_score, station_information : (q,), of each column of the station alone
-    tempco : (units, m), g/K, temperature coefficients of the biases in the model; nan without
-    floor : g, rms of the noise of a dwell · size : (m, k), g, rms over the dwells of a column beyond the model, coefficient one
+    lot : (h, h), for the h = axes·k sums over the units, errors of the station eliminated, which couples the axes
+    inside : (axes, k, k), of a unit before the elimination
+    size : (h,), g, rms over the dwells of a column beyond the model, coefficient one · lots : number of lots
     """
 
-    columns: tuple[tuple[str, int], ...]
-    station: tuple[tuple[str, int], ...]
-    axes: tuple[int, ...]
-    score: Array
-    own: Array
+    columns: tuple[Column, ...]
+    station: tuple[Column, ...]
     lot: Array
     inside: Array
-    station_score: Array
-    station_information: Array
+    size: Array
+    lots: int = 1
+
+    @classmethod
+    def mean(cls, parts: "Sequence[Products]") -> "Products":
+        """Means over all lots of the parts."""
+        lots = [part.lots for part in parts]
+        lot, inside, size = (
+            np.average([getattr(part, name) for part in parts], axis=0, weights=lots)
+            for name in ("lot", "inside", "size")
+        )
+        return cls(parts[0].columns, parts[0].station, lot, inside, size, sum(lots))
+
+
+@dataclass(frozen=True)
+class LotScores:
+    """Scores of a lot, in the order of the h hypotheses: axes × columns.
+
+    products : of the columns in this lot, or means over similar lots
+    score : (units, h), errors of the station eliminated · own : (units, h), information before the elimination
+    information : (h,), of the sums over the units, errors of the station eliminated
+    of_station : (2, q), score and information of each column of the station alone
+    tempco : (units, axes), g/K, temperature coefficients of the biases in the model; nan without
+    floor : g, rms of the noise of a dwell
+    """
+
+    products: Products
+    score: Array
+    own: Array
+    information: Array
+    of_station: Array
     tempco: Array
     floor: float
-    size: Array
+
+
+def correlations_of(products: Array) -> Array:
+    """Products (..., k, k) normalised to a unit diagonal; zero where the diagonal is zero."""
+    root = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 0.0))
+    return over(products, root[..., :, None] * root[..., None, :])
 
 
 def scores_of(
@@ -96,10 +126,10 @@ def scores_of(
     return _scored(model, [*local, *shared], tuple(names), tuple(station))
 
 
-def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[list[Array], list[tuple[str, int]]]:
+def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[list[Array], list[Column]]:
     """Columns, (blocks, n, p) each, of effects at the middle of their grids, and their names; without unrecorded quantities."""
     made: list[Array] = []
-    names: list[tuple[str, int]] = []
+    names: list[Column] = []
     for effect in effects:
         try:
             of_effect = problem.columns(effect, starting_values([effect], problem.lot.state).get(effect.id, {}))
@@ -113,7 +143,10 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[list[Array
 
 
 def _scored(
-    model: Model, columns: Sequence[Array], names: tuple[tuple[str, int], ...], station: tuple[tuple[str, int], ...]
+    model: Model,
+    columns: Sequence[Array],
+    names: tuple[Column, ...],
+    station: tuple[Column, ...],
 ) -> LotScores:
     """Scores of all columns, those of the sensor before those of the station, whitened in one pass."""
     problem, space, even, covariance = model.problem, model.space, model.even, model.problem.covariance
@@ -149,18 +182,13 @@ def _scored(
     less = less * np.outer(separable, separable)
     rms = np.sqrt(np.maximum(plain, 0.0) * visible[:, :k] * covariance.white / problem.n)
     return LotScores(
-        columns=names,
-        station=station,
-        axes=tuple(problem.axes),
-        score=free.reshape(units, m, k) * separable,
-        own=information.reshape(units, m, k),
-        lot=less,
-        inside=lots / units,
-        station_score=station_score,
-        station_information=np.diagonal(between).copy(),
+        products=Products(names, station, less, lots / units, rms.reshape(units, -1).mean(axis=0)),
+        score=(free.reshape(units, m, k) * separable).reshape(units, -1),
+        own=information.reshape(units, -1),
+        information=np.diagonal(less).copy(),
+        of_station=np.stack([station_score, np.diagonal(between)]),
         tempco=_tempco(model).reshape(units, m),
         floor=model.floor(),
-        size=rms.reshape(units, m, k).mean(axis=0),
     )
 
 

@@ -7,11 +7,13 @@ passed through the same filter.
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from inertial.arrays import Array, Flags
+from inertial.arrays import Array, Flags, over
 
 WALKS: Array = np.array([0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0])
 """Variance of the walk from one lot of a station to the next, over that of the noise of a lot."""
@@ -20,7 +22,6 @@ WALK_FROM = 2.0
 """Gain of log likelihood from which on stations have a random walk; a value constant within a lot may then be station wander."""
 
 _LARGEST = 5.0
-_BETWEEN = "\x1f"  # separator of the names of a driver and of a station, which may contain any printable character
 
 
 @dataclass
@@ -37,11 +38,16 @@ class Level:
 class Innovation:
     """Innovation of a lot: its deviation from the prediction by its station's past, over the standard deviation.
 
+    size, information : (h,), of the lot; zero information: not measured · rms : (h,), of earlier innovations
     value : (h,), at the walk that the past prefers, of unit variance if the noise is as stated; zero if there is no past
     every : (q, h), the same at each walk · gain, roots : (q, h), filter gains, and standard deviations of the innovations
     known : (h,), whether the station has earlier lots
     """
 
+    station: str
+    size: Array
+    information: Array
+    rms: Array
     value: Array
     every: Array
     gain: Array
@@ -61,7 +67,7 @@ class Wander:
         self.stations: dict[str, Level] = {}
         self.log_likelihood: Array = np.zeros((WALKS.size, count))
         self.beside: dict[str, Array] = {}  # log likelihood with the prediction of each driver in the model
-        self._scale, self._lots = np.zeros(count), np.zeros(count)
+        self._lots = np.zeros((2, count))  # Σ of the noise variance of the lots, and their number
 
     @property
     def gained(self) -> Array:
@@ -80,23 +86,22 @@ class Wander:
             self.stations[station] = Level(np.zeros(shape), np.zeros(shape), np.zeros(shape[1], dtype=bool))
         return self.stations[station]
 
-    def innovation(self, station: str, size: Array, information: Array) -> Innovation:
-        """The innovation of a lot with sizes (h,) and information (h,); zero information: not measured."""
+    def innovation(self, station: str, size: Array, information: Array, rms: Array) -> Innovation:
+        """The innovation of a lot with sizes (h,) and information (h,), beside the rms (h,) of earlier ones."""
         level, seen = self.level(station), information > 0.0
         safe = np.where(seen, information, 1.0)
         # the walk is in units of the noise variance of a typical lot
-        typical = np.where(self._lots > 0.0, self._scale / np.maximum(self._lots, 1.0), 1.0 / safe)
+        typical = np.where(self._lots[1] > 0.0, over(*self._lots), 1.0 / safe)
         variance = level.variance + WALKS[:, None] * typical
         total = variance + 1.0 / safe
         roots = np.sqrt(total)
         known = level.known & seen
         every = np.where(known, (size - level.mean) / roots, 0.0)
         gain = np.where(level.known, variance / total, 1.0)
-        return Innovation(_chosen_of(every, self.log_likelihood), every, gain, roots, known)
+        value = _chosen_of(every, self.log_likelihood)
+        return Innovation(station, size, information, rms, value, every, gain, roots, known)
 
-    def beside_driver(
-        self, name: str, station: str, prediction: Array, found: Innovation, rms: Array, told: Flags
-    ) -> tuple[Array, Array]:
+    def beside_driver(self, name: str, prediction: Array, found: Innovation, told: Flags) -> tuple[Array, Array]:
         """Innovation of a lot, and innovation of a driver's prediction in the same filter, (h,) each; updates the state.
 
         The walk is the one that the past prefers with the driver's predictions in the model: a change that the driver explains at
@@ -106,7 +111,7 @@ class Wander:
         ----------
         told : (h,), whether the prediction is based on enough lots; if not, a step does not count as evidence of a walk
         """
-        level = self.level(station)
+        level = self.level(found.station)
         likelihood = self.beside.setdefault(name, np.zeros_like(self.log_likelihood))
         before = level.predictors.get(name)
         if before is None:
@@ -114,64 +119,40 @@ class Wander:
             return np.zeros(prediction.size), np.zeros(prediction.size)
         every = np.where(found.known, (prediction - before) / found.roots, 0.0)
         value, left = _chosen_of(found.every, likelihood), _chosen_of(every, likelihood)
-        likelihood += np.where(told, _likelihood(found.every - every, found, rms), 0.0)
+        likelihood += np.where(told, _likelihood(found.every - every, found), 0.0)
         before += found.gain * (prediction - before)
         return value, left
 
-    def update(self, station: str, size: Array, information: Array, found: Innovation, rms: Array) -> None:
-        """Update the filter of a station with a lot.
-
-        Parameters
-        ----------
-        rms : (h,), of earlier innovations; larger ones than five times it are clipped
-        """
-        level, seen = self.level(station), information > 0.0
-        bounded = np.clip(found.every, -_LARGEST * rms, _LARGEST * rms)
-        self.log_likelihood += _likelihood(found.every, found, rms)
-        moved = np.where(level.known, level.mean + found.gain * bounded * found.roots, size)
-        safe = np.where(seen, information, 1.0)
+    def update(self, found: Innovation) -> None:
+        """Update the filter of a station with a lot; innovations larger than five times their rms are clipped."""
+        level, seen = self.level(found.station), found.information > 0.0
+        bounded = np.clip(found.every, -_LARGEST * found.rms, _LARGEST * found.rms)
+        self.log_likelihood += _likelihood(found.every, found)
+        moved = np.where(level.known, level.mean + found.gain * bounded * found.roots, found.size)
+        safe = np.where(seen, found.information, 1.0)
         level.mean = np.where(seen, moved, level.mean)
         level.variance = np.where(seen, found.gain / safe, level.variance)
         level.known = level.known | seen
-        self._scale += np.where(seen, 1.0 / safe, 0.0)
-        self._lots += seen
+        self._lots += np.where(seen, 1.0 / safe, 0.0), seen
 
-    def arrays(self) -> dict[str, Array]:
-        """The state as named arrays."""
-        out: dict[str, Array] = {"likelihood": self.log_likelihood, "scale": np.stack([self._scale, self._lots])}
-        out |= {f"beside/{name}": value for name, value in self.beside.items()}
-        for station, level in self.stations.items():
-            out[f"station/{station}"] = np.stack([level.mean, level.variance])
-            out[f"known/{station}"] = level.known.astype(np.float64)
-            out |= {f"predictor/{name}{_BETWEEN}{station}": value for name, value in level.predictors.items()}
-        return out
+    def arrays(self) -> dict[str, Any]:
+        """The state as nested arrays."""
+        stations = {station: vars(level) for station, level in self.stations.items()}
+        return {"likelihood": self.log_likelihood, "beside": self.beside, "lots": self._lots, "stations": stations}
 
-    def restore(self, arrays: Mapping[str, Array]) -> None:
-        """Restore the state of :meth:`arrays`."""
-        self.log_likelihood = arrays["likelihood"].copy()
-        self._scale, self._lots = arrays["scale"].copy()
-        for key, value in arrays.items():
-            kind, _, name = key.partition("/")
-            if kind == "beside":
-                self.beside[name] = value.copy()
-            elif kind == "station":
-                self.stations[name] = Level(*value.copy(), known=arrays[f"known/{name}"] > 0.0)
-        for key, value in arrays.items():
-            kind, _, rest = key.partition("/")
-            if kind == "predictor":
-                driver, _, station = rest.partition(_BETWEEN)
-                self.stations[station].predictors[driver] = value.copy()
+    @classmethod
+    def restored(cls, arrays: Mapping[str, Any]) -> "Wander":
+        """The filters with the state of :meth:`arrays`."""
+        new = cls(0)
+        new.log_likelihood, new._lots = arrays["likelihood"].copy(), arrays["lots"].copy()
+        new.beside = {name: value.copy() for name, value in arrays.get("beside", {}).items()}
+        new.stations = {station: Level(**deepcopy(level)) for station, level in arrays.get("stations", {}).items()}
+        return new
 
 
-def over(values: Array, weights: Array) -> Array:
-    """Values divided by weights; zero where a weight is zero."""
-    there = weights > 0.0
-    return np.where(there, values / np.where(there, weights, 1.0), 0.0)
-
-
-def _likelihood(every: Array, found: Innovation, rms: Array) -> Array:
+def _likelihood(every: Array, found: Innovation) -> Array:
     """Log likelihood ratio (q, h) of innovations at each walk to that without one; innovations are clipped at five rms."""
-    bounded = np.clip(every, -_LARGEST * rms, _LARGEST * rms) / np.maximum(rms, 1e-300)
+    bounded = np.clip(every, -_LARGEST * found.rms, _LARGEST * found.rms) / np.maximum(found.rms, 1e-300)
     gained = -np.log(found.roots) - 0.5 * bounded**2
     return np.where(found.known, gained - gained[0], 0.0)
 

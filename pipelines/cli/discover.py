@@ -92,7 +92,7 @@ def command(
     if html is not None:
         from pipelines.discovery.page import render
 
-        publish(html, render(looked.findings, document, str(Archive(archive).root)), "discover")
+        publish(html, render(looked.found, document, str(Archive(archive).root)), "discover")
     if explain:
         give(explained(document, explain), print_explained, as_json=as_json)
         return

@@ -7,14 +7,14 @@ from functools import reduce
 from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
-from inertial.discovery.evidence import INSIDE
 from pipelines.archive import Archive
 from pipelines.discovery.coefficient_populations import populations
+from pipelines.discovery.discoveries import Discoveries, plain
 from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow, UnexplainedRow
-from pipelines.discovery.figures_of_name import size_of
-from pipelines.discovery.findings import Findings
+from pipelines.discovery.evidence_state import Evidences
+from pipelines.discovery.findings import document_of
 from pipelines.discovery.lot_source import DiscoveryArchive
-from pipelines.discovery.nights import brought_up, found_before, fresh, grown_by_days, remembered
+from pipelines.discovery.nights import brought_up, found_before, grown_by_days, remembered
 from pipelines.parallel import Distributor
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import MICRO
@@ -45,9 +45,9 @@ class Look:
 
 @dataclass(frozen=True)
 class Looked:
-    """The findings with their document."""
+    """What was found, with its document."""
 
-    findings: Findings
+    found: Discoveries
     document: DiscoverDocument
 
 
@@ -64,75 +64,68 @@ def discovered(archive: Archive, look: Look) -> Looked:
         source.device  # noqa: B018 - refuses an unknown name before any run is scored
         source.score(look.workers, look.distribute)
         state = brought_up(source)
-        findings = Findings(source, state)
-        keep = not (look.since or look.looking_back or look.effects or look.drivers or look.explained)
-        document = remembered(source, state, findings.document(found_before(source, state)), keep=keep)
         if look.since or look.looking_back:
-            findings = _in_memory(source, look)
-            document = findings.document(looking_back=True)
+            found = _in_memory(source, look)
+            document = document_of(found, looking_back=True)
+        else:
+            found, keep = Discoveries(source, state), not (look.effects or look.drivers or look.explained)
+            document = remembered(source, state, document_of(found, found_before(source, state)), keep=keep)
         if look.effects:
-            findings, document = _with_effects(source, findings, document, look.effects)
+            found, document = _with_effects(found, document, look.effects)
         if look.populations:
             document["population"] = populations(archive, source.device, look.workers)
     if look.drivers:
         document = _of_drivers(document, look.drivers)
-    return Looked(findings, document)
+    return Looked(found, document)
 
 
-def _in_memory(source: DiscoveryArchive, look: Look) -> Findings:
-    """Findings of the lots since a day, with the attributes known now; nothing is stored."""
-    known = (run for run in source.pooled() if run not in source.revoked)
-    runs = [run for run in known if str(source.store.head(run)["when"])[:10] >= look.since]
-    if not runs:
+def _in_memory(source: DiscoveryArchive, look: Look) -> Discoveries:
+    """Discoveries of the lots since a day, with the attributes known now; nothing is stored."""
+    runs = [run for run in source.pooled() if run not in source.revoked and source.day_of(run) >= look.since]
+    if source.pooled() and not runs:
         raise WrongUse(f"discover: no lot of {source.device} was measured since {look.since}; give an earlier --since")
-    return Findings(source, grown_by_days(source, fresh(source), runs))
+    return Discoveries(source, grown_by_days(source, Evidences.fresh(source), runs))
 
 
 def _with_effects(
-    source: DiscoveryArchive, before: Findings, document: DiscoverDocument, effects: Sequence[str]
-) -> tuple[Findings, DiscoverDocument]:
-    """Findings with effects added to the model of every lot, and the document that compares every discovery with before."""
+    before: Discoveries, document: DiscoverDocument, effects: Sequence[str]
+) -> tuple[Discoveries, DiscoverDocument]:
+    """Discoveries with effects added to the model of every lot, and the document that compares every discovery with before."""
     catalogue.get_all(effects)
-    pool = before.pool
+    pool = before.source.pool
     added = [effect for effect in effects if effect in pool.effects]
     if not added:
         raise WrongUse(
             f"discover: none of {', '.join(effects)} is beyond the model of the lots, one at least is needed; "
             f"{did_you_mean(effects[0], pool.effects)}"
         )
-    changed = source.with_change(lambda lot: reduce(pool.with_effect, added, lot))
-    after = Findings(changed, grown_by_days(changed, fresh(changed), before.state.order))
-    extended = after.document(looking_back=True)
+    changed = before.source.with_change(lambda lot: reduce(pool.with_effect, added, lot))
+    after = Discoveries(changed, grown_by_days(changed, Evidences.fresh(changed), before.state.order))
+    extended = document_of(after, looking_back=True)
     extended["model"] = [*document["model"], *added]
     extended["compared"] = [_compared(row, before, after) for row in document["discoveries"] if row["axes"]]
     return after, extended
 
 
-def _compared(row: DiscoveryRow, before: Findings, after: Findings) -> ComparedAlarm:
+def _compared(row: DiscoveryRow, before: Discoveries, after: Discoveries) -> ComparedAlarm:
+    # the largest log evidence of the driver over all effects, and the size of the largest effect that is still named for it
+    log_e = [
+        max(
+            (float(s.log_e.max()) for name, s in of.state.sensor.drivers.items() if plain(name) == row["driver"]),
+            default=0.0,
+        )
+        for of in (before, after)
+    ]
+    left = (discovery for discovery in after.named if discovery.drivers[0] == row["driver"])
     return {
         "id": row["id"],
         "recommended": row["recommended"],
         "driver": row["driver"],
-        "log_e_before": round(_largest(before, row), 2),
-        "log_e_after": round(_largest(after, row), 2),
+        "log_e_before": round(log_e[0], 2),
+        "log_e_after": round(log_e[1], 2),
         "size_ug_before": row["size_ug"],
-        # size of the largest effect that is still named for the driver
-        "size_ug_after": next(
-            (
-                MICRO * size_of(discovery.name)[0]
-                for discovery in after.discoveries
-                if discovery.drivers[0] == row["driver"]
-            ),
-            0.0,
-        ),
+        "size_ug_after": next((MICRO * discovery.name.size()[0] for discovery in left), 0.0),
     }
-
-
-def _largest(findings: Findings, row: DiscoveryRow) -> float:
-    """The largest log evidence of a discovery's driver over all effects."""
-    drivers = findings.state.sensor.drivers
-    values = [float(sums.log_e.max()) for name, sums in drivers.items() if name.removesuffix(INSIDE) == row["driver"]]
-    return max(values, default=0.0)
 
 
 def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverDocument:
@@ -144,7 +137,7 @@ def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverD
     document["unexplained"] = [row for row in document["unexplained"] if row["driver"] in drivers]
     shown = {row["id"] for row in [*document["discoveries"], *document["unexplained"]]}
     document["new"] = [name for name in document["new"] if name in shown]
-    document["held"] = [row for row in document["held"] if row["driver"].removesuffix(INSIDE) in drivers]
+    document["held"] = [row for row in document["held"] if plain(row["driver"]) in drivers]
     document["drivers"] = [row for row in document["drivers"] if row["name"] in drivers]
     return document
 

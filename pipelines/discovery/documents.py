@@ -4,6 +4,8 @@ from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
+Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
+
 
 class LeftOutRun(TypedDict):
     """A run that is not pooled."""
@@ -65,12 +67,13 @@ class DiscoveryRow(TypedDict):
     interval_ug: Annotated[list[float], "95 %"]
     size_floors: Annotated[float | None, "the same over the noise of a dwell of one lot"]
     log_e: float
-    scope: Literal["sensor", "station", "sensor_or_station", "thermometer"]
+    scope: Scope
     because: str
     levels: list[DiscoveredLevel]
     carried_by: CarriedBy
     confirmed: Annotated[
-        bool | None, "whether later lots show what earlier ones predict; null: fewer than 20 later lots"
+        bool | None,
+        "whether later lots show what earlier ones predict; null: fewer than 20 of them, or an error of references",
     ]
     confirmed_factor: NotRequired[Annotated[list[float], "later over predicted, and its standard error"]]
     next: str

@@ -1,19 +1,24 @@
-"""The evidence of a kind of device after some evaluations (nights), its alarms, and the file that stores it."""
+"""The evidence of a kind of device after some evaluations (nights): its hypotheses, thresholds, alarms, and its file."""
 
 import io
+import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import astuple, dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from inertial.arrays import Array, Places
-from inertial.discovery.evidence import MEAN, STATION, Evidence
+from inertial.arrays import Array, Places, over
+from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence
 from inertial.discovery.running_sums import FIRST
+from inertial.discovery.scores import Column
+from inertial.discovery.station_wander import WALK_FROM
 from pipelines.archive import derived, files
 from pipelines.archive.store import Place
-from pipelines.discovery.lot_source import AXES, Column, DiscoveryArchive
+from pipelines.discovery.lot_source import DiscoveryArchive
+from pipelines.discovery.score_store import AXES
 
 ALPHA = 0.05
 """Probability of any false discovery over the complete life of an archive."""
@@ -26,15 +31,29 @@ _MOST_COLUMNS = 5
 columns a little: summed over the 63 of any function of pose, that caused false discoveries in 6 of 47 archives in which one lot
 in a hundred had twenty times the noise."""
 
-_LAYOUT = 2  # version of the state file
+_MOST_HELD = 0.2
+"""Largest part of an effect's evidence by all its columns that columns and axes which would be held may contribute."""
+
+_LAYOUT = 3  # version of the state file
+_WITHIN = "\x1f"  # joins the names of nested arrays: names of drivers and stations may contain any printable character
+
+
+class Hypothesis(NamedTuple):
+    """What is judged: a column on an axis; column -1 and axis "": all columns of an effect; axis "": a column of the station."""
+
+    effect: str
+    column: int
+    axis: str
+
+    def __str__(self) -> str:
+        if self.column < 0:
+            return self.effect
+        return f"{self.effect}.{self.column}" + (f".{self.axis}" if self.axis else "")
 
 
 @dataclass(frozen=True)
 class Alarm:
-    """Evidence beyond the threshold: driver, index of the hypothesis, first night, number of lots then, log evidence then.
-
-    index : axes × columns of the sensor, then its effects with all columns, then columns of the station
-    """
+    """Evidence beyond the threshold: driver, index of the hypothesis, first night, number of lots then, log evidence then."""
 
     driver: str
     index: int
@@ -52,7 +71,6 @@ class Evidences:
     generations : index of the night that added each driver; later ones share a smaller error probability
     """
 
-    device: str
     columns: tuple[Column, ...]
     of_station: tuple[Column, ...]
     sensor: Evidence
@@ -63,13 +81,33 @@ class Evidences:
     alarms: list[Alarm] = field(default_factory=list[Alarm])
     night: int = 0
 
-    def unknown(self, alarms: Iterable[Alarm]) -> list[Alarm]:
-        """The alarms for hypotheses without an earlier alarm."""
-        known = {(alarm.driver, alarm.index) for alarm in self.alarms}
-        return [alarm for alarm in alarms if (alarm.driver, alarm.index) not in known]
+    @classmethod
+    def fresh(cls, source: DiscoveryArchive) -> "Evidences":
+        """Evidence without a lot."""
+        sensor, station = source.columns
+        order: list[str] = []
+        made = Evidence(AXES * len(sensor), source.earlier(order), numbered(sensor))
+        return cls(sensor, station, made, Evidence(len(station)), order)
 
-    def needed(self, driver: str, *, of_station: bool = False) -> Array:
-        """Threshold of the log evidence of each hypothesis of a driver, (hypotheses,).
+    @cached_property
+    def hypotheses(self) -> list[Hypothesis]:
+        """Axes × columns of the sensor, then its effects with all columns, then columns of the station."""
+        single = [Hypothesis(effect, column, axis) for axis in "xyz" for effect, column in self.columns]
+        complete = [Hypothesis(effect, -1, "") for effect in dict.fromkeys(effect for effect, _ in self.columns)]
+        return [*single, *complete, *(Hypothesis(effect, column, "") for effect, column in self.of_station)]
+
+    def effect_of(self, alarm: Alarm) -> str:
+        """Id of the effect of an alarm."""
+        return self.hypotheses[alarm.index].effect
+
+    def log_e(self, driver: str) -> Array:
+        """Logarithm of the evidence of every hypothesis by a driver, -inf where it does not judge."""
+        of_station = self.station.drivers.get(driver) if driver in STATION_DRIVERS else None
+        parts = (self.sensor, self.sensor.drivers.get(driver)), (self.station, of_station)
+        return np.concatenate([np.full(of.size, -np.inf) if sums is None else sums.log_e for of, sums in parts])
+
+    def needed(self, driver: str) -> Array:
+        """Threshold of the log evidence of each hypothesis by a driver.
 
         The drivers of a generation share its error probability equally, and so do the effects of a driver: half of an effect's
         share is for all its columns together, half for its single columns and axes. An effect of many columns, as any function
@@ -80,20 +118,55 @@ class Evidences:
             len(STATION_DRIVERS) if generation == 0 else 0
         )
         share = ALPHA * 0.5 ** (generation + 1) / drivers
-        if of_station:
-            return np.full(len(self.of_station), np.log(len(self.of_station) / share))
-        of_column = numbered(self.columns)
+        of_column, count = numbered(self.columns), len(self.of_station)
         columns = np.bincount(of_column)
         effect_share = np.where(columns > _MOST_COLUMNS, 0.0, 0.5)
         shares = np.concatenate([np.tile(((1.0 - effect_share) / (AXES * columns))[of_column], AXES), effect_share])
-        return np.where(
+        of_sensor = np.where(
             shares > 0.0, np.log(columns.size / share) - np.log(np.where(shares > 0.0, shares, 1.0)), np.inf
         )
+        return np.append(
+            of_sensor, np.full(count, np.log(max(count, 1) / share) if driver in STATION_DRIVERS else np.inf)
+        )
 
-    @property
-    def least_needed(self) -> float:
-        """The smallest threshold of the mean's hypotheses."""
-        return float(self.needed(MEAN).min(initial=np.inf))
+    def least_needed(self, driver: str = MEAN) -> float:
+        """The smallest threshold of a driver's hypotheses of the sensor."""
+        return float(self.needed(driver)[: self.sensor.size].min(initial=np.inf))
+
+    def unknown(self, alarms: Iterable[Alarm]) -> list[Alarm]:
+        """The alarms for hypotheses without an earlier alarm."""
+        known = {(alarm.driver, alarm.index) for alarm in self.alarms}
+        return [alarm for alarm in alarms if (alarm.driver, alarm.index) not in known]
+
+    def raised(self) -> list[Alarm]:
+        """Hypotheses beyond the threshold, without an earlier alarm."""
+        out: list[Alarm] = []
+        for driver in self.sensor.drivers | self.station.drivers:
+            log_e = self.log_e(driver)
+            beyond = np.flatnonzero(log_e >= self.needed(driver)).tolist()
+            out += [Alarm(driver, at, self.night, len(self.order), float(log_e[at])) for at in beyond]
+        return self.unknown(sorted(out, key=lambda alarm: alarm.index >= self.sensor.size))
+
+    def judged(self, *, held: bool) -> list[Alarm]:
+        """Alarms that are discoveries, or those that are held back; without those that no present evidence supports."""
+        judged = (a for a in self.alarms if a.driver in self.sensor.drivers or a.driver in self.station.drivers)
+        return [alarm for alarm in judged if self.held(alarm) is held]
+
+    def held(self, alarm: Alarm) -> bool:
+        """Whether a station may cause an alarm: its driver is constant in a lot, and the effect wanders or differs by station."""
+        sensor, wander = self.sensor, self.sensor.wander
+        if alarm.index >= sensor.size or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT, STATION}:
+            return False  # judged within lots, or explicitly attributed to the station
+        if alarm.driver == MEAN:
+            of_station = ~sensor.shared_by_stations() | sensor.guarded
+        else:
+            walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
+            of_station = walk > WALK_FROM
+        if alarm.index < sensor.count or sensor.effects is None:
+            return bool(of_station[alarm.index])
+        of_effect, sums = sensor.effects == alarm.index - sensor.count, sensor.drivers[alarm.driver]
+        carried = of_effect * over(sums.s[: sensor.count] ** 2, sums.v[: sensor.count])
+        return float(carried[of_station].sum()) > _MOST_HELD * float(carried.sum())
 
 
 def numbered(columns: Sequence[Column]) -> Places:
@@ -102,44 +175,22 @@ def numbered(columns: Sequence[Column]) -> Places:
     return np.array([number[effect] for effect, _ in columns], dtype=np.intp)
 
 
-def below(parts: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """The parts whose names begin with a prefix, without it."""
-    return {name.removeprefix(prefix): value for name, value in parts.items() if name.startswith(prefix)}
-
-
-def hypothesis(state: Evidences, index: int) -> tuple[str, int, str]:
-    """Effect, column and axis of a hypothesis; axis "" for the station, column -1 and axis "" for all columns of an effect."""
-    if index >= state.sensor.size:
-        effect, column = state.of_station[index - state.sensor.size]
-        return effect, column, ""
-    if index >= state.sensor.count:
-        return list(dict.fromkeys(name for name, _ in state.columns))[index - state.sensor.count], -1, ""
-    axis, at = divmod(index, len(state.columns))
-    effect, column = state.columns[at]
-    return effect, column, "xyz"[axis]
-
-
 def state_bytes(state: Evidences) -> bytes:
     """The state as the content of a file."""
+    arrays = _flat({"sensor": state.sensor.arrays(), "station": state.station.arrays()})
     about = {
-        "columns": np.array([f"{name} {column}" for name, column in state.columns], dtype=np.str_),
-        "of_station": np.array([f"{name} {column}" for name, column in state.of_station], dtype=np.str_),
-        "order": np.array(state.order, dtype=np.str_),
-        "taken_out": np.array(state.taken_out, dtype=np.str_),
-        "drivers": np.array(list(state.generations), dtype=np.str_),
-        "generations": np.array(list(state.generations.values()), dtype=np.int64),
-        "alarm_drivers": np.array([a.driver for a in state.alarms], dtype=np.str_),
-        "alarms": np.array([(a.index, a.night, a.lots, a.log_e) for a in state.alarms], dtype=float).reshape(-1, 4),
-        "night": np.array(state.night),
-        "layout": np.array(_LAYOUT),
+        "layout": _LAYOUT,
+        "columns": [state.columns, state.of_station],
+        "order": state.order,
+        "taken_out": state.taken_out,
+        "generations": state.generations,
+        "alarms": [astuple(alarm) for alarm in state.alarms],
+        "night": state.night,
+        "names": list(arrays),
     }
-    parts = {f"about/{name}": value for name, value in about.items()}
-    for kind, evidence in (("sensor", state.sensor), ("station", state.station)):
-        parts |= {f"{kind}/{name}": value for name, value in evidence.arrays().items()}
     buffer = io.BytesIO()
-    # names of drivers and stations may contain any character: they are stored as a list, and the arrays are numbered
-    numbered = {str(number): value for number, value in enumerate(parts.values())}
-    np.savez(buffer, allow_pickle=False, names=np.array(list(parts)), **numbered)
+    parts = {str(number): value for number, value in enumerate(arrays.values())}
+    np.savez(buffer, allow_pickle=False, about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8), **parts)
     return buffer.getvalue()
 
 
@@ -154,28 +205,41 @@ def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mappi
     if standing != derived.SOUND or files.hash_of(data) != nights[-1]["state"] or nights[-1]["lots"] < FIRST:
         return None
     with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
-        parts = {str(name): loaded[str(n)] for n, name in enumerate(loaded["names"])}
-    about = below(parts, "about/")
-    sensor, station = source.columns
-    if "layout" not in about or about["layout"] != _LAYOUT:
+        about = json.loads(loaded["about"].tobytes()) if "about" in loaded else {}
+        arrays = {name: loaded[str(number)] for number, name in enumerate(about.get("names", []))}
+    if about.get("layout") != _LAYOUT or about["columns"] != json.loads(json.dumps(source.columns)):
         return None
-    if [f"{name} {column}" for name, column in (*sensor, *station)] != [*about["columns"], *about["of_station"]]:
+    if any(run not in source.store.heads for run in about["order"]):
         return None
-    if any(str(run) not in source.store.rows for run in about["order"]):
-        return None
-    order = [str(run) for run in about["order"]]
+    (sensor, station), parts = source.columns, _nested(arrays)
     return Evidences(
-        device=source.device,
         columns=sensor,
         of_station=station,
-        sensor=Evidence.restored(AXES * len(sensor), below(parts, "sensor/"), source.earlier(order), numbered(sensor)),
-        station=Evidence.restored(len(station), below(parts, "station/"), lambda _, __: None),
-        order=order,
-        taken_out=[str(run) for run in about["taken_out"]],
-        generations={str(name): int(n) for name, n in zip(about["drivers"], about["generations"], strict=True)},
-        alarms=[
-            Alarm(str(driver), int(index), int(night), int(lots), float(log_e))
-            for driver, (index, night, lots, log_e) in zip(about["alarm_drivers"], about["alarms"], strict=True)
-        ],
-        night=int(about["night"]),
+        sensor=Evidence.restored(AXES * len(sensor), parts["sensor"], source.earlier(about["order"]), numbered(sensor)),
+        station=Evidence.restored(len(station), parts["station"]),
+        order=about["order"],
+        taken_out=about["taken_out"],
+        generations=about["generations"],
+        alarms=[Alarm(*alarm) for alarm in about["alarms"]],
+        night=about["night"],
     )
+
+
+def _flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    """The arrays of nested mappings, by joined names."""
+    out: dict[str, Any] = {}
+    for name, value in tree.items():
+        out |= _flat(value, f"{above}{name}{_WITHIN}") if isinstance(value, dict) else {above + name: value}
+    return out
+
+
+def _nested(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """The nested mappings of :func:`_flat`; without those that were empty."""
+    tree: dict[str, Any] = {}
+    for name, value in arrays.items():
+        *above, last = name.split(_WITHIN)
+        branch = tree
+        for part in above:
+            branch = branch.setdefault(part, {})
+        branch[last] = value
+    return tree

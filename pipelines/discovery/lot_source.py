@@ -3,14 +3,17 @@
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from copy import copy
 from datetime import datetime
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from inertial.arrays import Array
-from inertial.discovery.evidence import MEAN, SLOT, STATION, UNIT, ScoredLot
+from inertial.arrays import Array, Places
+from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
+from inertial.discovery.naming import Pool
+from inertial.discovery.scores import Column, LotScores, Products
 from pipelines.archive import Archive, Run
 from pipelines.archive.attributes import Attributes, known_attributes
 from pipelines.archive.locks import alone
@@ -22,8 +25,6 @@ from pipelines.discovery.scored_run import ScoredRun
 from pipelines.parallel import Distributor
 from pipelines.tables.dwells import measured
 from schemas.errors import WrongUse, did_you_mean
-
-Column = tuple[str, int]
 
 SEASON, OPERATOR = "season", "operator"
 OWN_TEMPCO = "own temperature coefficient"
@@ -44,13 +45,13 @@ class DiscoveryArchive:
         self, archive: Archive, device: str = "", change: Callable[[ScoredLot], ScoredLot] = lambda lot: lot
     ) -> None:
         archive.refuse_none()
-        self.archive, self.store, self._change = archive, ScoreStore(archive), change
+        self.archive, self.store, self.change = archive, ScoreStore(archive), change
         self._device = device
 
     def with_change(self, change: Callable[[ScoredLot], ScoredLot]) -> "DiscoveryArchive":
         """The same archive with another change of its lots."""
-        other = DiscoveryArchive(self.archive, self.device, change)
-        other.store = self.store
+        other = copy(self)
+        other.change = change
         return other
 
     @cached_property
@@ -70,9 +71,14 @@ class DiscoveryArchive:
         return first
 
     @cached_property
+    def _devices(self) -> Counter[str]:
+        """The number of lots of each kind of device."""
+        return Counter(info.device for info in self.infos if info.id not in self._imports)
+
+    @cached_property
     def device(self) -> str:
         """The kind of device that is judged: the given one, else that of most runs."""
-        counts = Counter(info.device for info in self.infos if info.id not in self._imports)
+        counts = self._devices
         if self._device:
             wanted = next((count for count in counts if count.lower() == self._device.lower()), None)
             if wanted is None:
@@ -90,8 +96,11 @@ class DiscoveryArchive:
     @property
     def other_devices(self) -> dict[str, int]:
         """Runs of other kinds of devices, which are never pooled with it."""
-        counts = Counter(info.device for info in self.infos if info.id not in self._imports)
-        return {device: count for device, count in counts.items() if device != self.device}
+        return {device: count for device, count in self._devices.items() if device != self.device}
+
+    def day_of(self, run: str) -> str:
+        """The day of measurement of a run."""
+        return str(self.store.heads[run]["when"])[:10]
 
     def score(self, workers: int, distribute: Distributor | None = None) -> int:
         """Score the runs without scores; returns their number."""
@@ -122,18 +131,18 @@ class DiscoveryArchive:
         An import counts by the first of its fits that can be pooled; where none can, the last states the reason.
         """
         lots = dict[str, tuple[str, str]]()
-        for run in self.store.rows:
-            head, lot = self.store.head(run), self._imports.get(run, run)
+        for run, head in self.store.heads.items():
+            lot = self._imports.get(run, run)
             if head["device"] == self.device and lots.get(lot, ("", "-"))[1]:
                 lots.pop(lot, None)  # a lot arrives with the run that it counts by
-                lots[lot] = run, str(head["left_out"] or "")
+                lots[lot] = run, head["left_out"]
         yield from lots.values()
 
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
         """All columns of the sensor and all of the station that occur in any run of the archive."""
         sensor = dict.fromkeys(column for products in self.store.products for column in products.columns)
-        station = dict.fromkeys(column for products in self.store.products for column in products.of_station)
+        station = dict.fromkeys(column for products in self.store.products for column in products.station)
         return tuple(sensor), tuple(station)
 
     def lots(self, runs: Iterable[str]) -> Iterable[tuple[ScoredLot, ScoredLot]]:
@@ -144,43 +153,41 @@ class DiscoveryArchive:
 
     def lot_of(self, run: ScoredRun) -> ScoredLot:
         """A run as a lot, in the order of the archive's hypotheses."""
-        if run.score is None or run.own is None or run.information is None:
-            raise LookupError(run.run)
-        index = {column: at for at, column in enumerate(self.columns[0])}
-        at = np.array([index[column] for column in run.columns])
-        k, own_k = len(self.columns[0]), len(run.columns)
-        indices = (np.arange(AXES)[:, None] * k + at).reshape(-1)
+        scores, k = _scores_of(run), len(self.columns[0])
+        at = _indices(self.columns[0], scores.products.columns)
 
         def spread(values: Array) -> Array:
-            out = np.zeros((*values.shape[:-1], AXES * k))
-            out[..., indices] = values.reshape(*values.shape[:-1], AXES * own_k)
-            return out
+            out = np.zeros((*values.shape[:-1], AXES, k))
+            out[..., at] = values.reshape(*values.shape[:-1], AXES, at.size)
+            return out.reshape(*values.shape[:-1], -1)
 
         levels, numbers = self._drivers(run)
-        slopes = dict[str, Array]()
-        if run.tempco is not None and np.isfinite(run.tempco).all():
-            slopes[OWN_TEMPCO] = np.repeat(run.tempco, k, axis=1)
-        lot = ScoredLot(
-            run=run.run,
-            station=run.station,
-            day=_day(run.when),
-            units=run.units,
-            score=spread(run.score),
-            own=spread(run.own),
-            information=spread(run.information),
-            levels=levels,
-            numbers=numbers,
-            slopes=slopes,
-        )
-        return self._change(lot)
+        slopes = {OWN_TEMPCO: np.repeat(scores.tempco, k, axis=1)} if np.isfinite(scores.tempco).all() else {}
+        every = spread(scores.score), spread(scores.own), spread(scores.information)
+        return self.change(ScoredLot(run.run, run.station, _day(run.when), run.units, *every, levels, numbers, slopes))
 
     def _of_station(self, run: ScoredRun) -> ScoredLot:
-        index = {column: at for at, column in enumerate(self.columns[1])}
-        sums = np.zeros((2, len(index)))
-        if run.station_scores is not None:
-            sums[:, [index[column] for column in run.of_station]] = run.station_scores
+        scores, sums = _scores_of(run), np.zeros((2, len(self.columns[1])))
+        sums[:, _indices(self.columns[1], scores.products.station)] = scores.of_station
         score, information = sums
         return ScoredLot(run.run, run.station, _day(run.when), ("",), score[None], information[None], information)
+
+    @cached_property
+    def pool(self) -> Pool:
+        """The columns of all effects and their products, averaged over the runs of the archive."""
+        columns, station = self.columns
+        k = len(columns)
+        lot, inside, size = np.zeros((AXES, k, AXES, k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
+        weight = np.zeros(k)
+        for product in self.store.products:
+            at = _indices(columns, product.columns)
+            lots = product.lots * product.lot.reshape(AXES, at.size, AXES, at.size)
+            lot[np.ix_(np.arange(AXES), at, np.arange(AXES), at)] += lots
+            inside[:, at[:, None], at] += product.lots * product.inside
+            size[:, at] += product.lots * product.size.reshape(AXES, -1)
+            weight[at] += product.lots
+        size /= np.maximum(weight, 1.0)
+        return Pool(Products(columns, station, lot.reshape(AXES * k, -1), inside, size.reshape(-1)))
 
     def _drivers(self, run: ScoredRun) -> tuple[dict[str, tuple[str, ...]], dict[str, Array]]:
         levels: dict[str, tuple[str, ...]] = {SLOT: run.slots} if any(run.slots) else {}
@@ -203,7 +210,7 @@ class DiscoveryArchive:
         """For each attribute that is a driver its numbers; None for labels."""
         out: dict[str, dict[str, float] | None] = {}
         for name in self.attributes.names():
-            if name in {MEAN, STATION, SLOT, UNIT, "date"}:
+            if name in {MEAN, STATION, SLOT, UNIT, DATE}:
                 continue
             every = (by_key.values() for by_key in (self.attributes.serial, self.attributes.run))
             out[name] = as_numbers([value.get(name, "") for values in every for value in values])
@@ -216,21 +223,16 @@ class DiscoveryArchive:
         ----------
         order : the lots of the evidence, which grows while they are added
         """
-        index: dict[str, int | list[int]] = {}  # most units are measured once
+        index: dict[str, tuple[int, ...]] = {}
         known = 0
 
         def of(unit: str, taken: int) -> tuple[Array, Array] | None:
             nonlocal known
             for number in range(known, len(order)):
-                for serial in self.store.head(order[number])["units"]:
-                    lot_numbers = index.setdefault(serial, number)
-                    if isinstance(lot_numbers, list):
-                        lot_numbers.append(number)
-                    elif lot_numbers != number:
-                        index[serial] = [lot_numbers, number]
+                for serial in self.store.heads[order[number]]["units"]:
+                    index[serial] = (*index.get(serial, ()), number)
             known = len(order)
-            lots_of = index.get(unit, [])
-            before = [order[k] for k in (lots_of if isinstance(lots_of, list) else [lots_of]) if k < taken]
+            before = [order[k] for k in index.get(unit, ()) if k < taken]
             if not before:
                 return None
             lots = (self.lot_of(self.store.run(run)) for run in before)
@@ -251,3 +253,15 @@ class DiscoveryArchive:
 
 def _day(when: str) -> float:
     return datetime.fromisoformat(when).timestamp() / 86400.0
+
+
+def _scores_of(run: ScoredRun) -> LotScores:
+    if run.scores is None:
+        raise LookupError(run.run)
+    return run.scores
+
+
+def _indices(columns: Sequence[Column], of_run: Sequence[Column]) -> Places:
+    """Index of each column of a run among those of the archive."""
+    index = {column: at for at, column in enumerate(columns)}
+    return np.array([index[column] for column in of_run], dtype=np.intp)

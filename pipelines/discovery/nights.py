@@ -2,7 +2,7 @@
 
 ``discovery/<device>/nights/<number>.json`` is never rewritten: a run whose calibration is revoked later is removed from that
 night on, which the entry records. ``discovery/<device>/state`` is a derived cache of the sums, which can be computed again from
-the scores.
+the scores. ``discovery/<device>/found`` has the discoveries of the last night, so that they keep their ids and are new once.
 """
 
 import json
@@ -11,41 +11,23 @@ from datetime import UTC, datetime
 from itertools import groupby
 from typing import Any
 
-import numpy as np
-
-from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence
-from inertial.discovery.station_wander import WALK_FROM, over
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
-from pipelines.discovery.evidence_state import (
-    STATION_DRIVERS,
-    Alarm,
-    Evidences,
-    hypothesis,
-    numbered,
-    state_bytes,
-    stored_state,
-)
-from pipelines.discovery.lot_source import AXES, DiscoveryArchive
+from pipelines.discovery.evidence_state import STATION_DRIVERS, Alarm, Evidences, state_bytes, stored_state
+from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
 
-_MOST_HELD = 0.2
-
-
-def fresh(source: DiscoveryArchive) -> Evidences:
-    """Evidence without a lot."""
-    sensor, station = source.columns
-    order: list[str] = []
-    made = Evidence(AXES * len(sensor), source.earlier(order), numbered(sensor))
-    return Evidences(source.device, sensor, station, made, Evidence(len(station)), order)
+_VERSION = 2  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
+_GROWN = 1.05  # growth of the number of lots from which on the naming is repeated
+_NOTHING: dict[str, Any] = {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0, "alarms": None}
 
 
 def grown_by_days(source: DiscoveryArchive, state: Evidences, runs: Sequence[str]) -> Evidences:
     """Evidence with further lots, one night for each day of measurement, so that a backlog of years is processed at once."""
-    for _, of_day in groupby(runs, key=lambda run: str(source.store.head(run)["when"])[:10]):
+    for _, of_day in groupby(runs, key=source.day_of):
         state.night += 1
         for sensor, station in source.lots(of_day):
             state.sensor.add(sensor)
@@ -54,54 +36,22 @@ def grown_by_days(source: DiscoveryArchive, state: Evidences, runs: Sequence[str
         generation = 1 + max(state.generations.values(), default=-1)
         for driver in state.sensor.drivers:
             state.generations.setdefault(driver, generation)
-        state.alarms += state.unknown(_raised(state))
+        state.alarms += state.raised()
     return state
-
-
-def _raised(state: Evidences) -> list[Alarm]:
-    """Hypotheses beyond the threshold; the indices of those of the station follow those of the sensor."""
-    out: list[Alarm] = []
-    for evidence, of_station in ((state.sensor, False), (state.station, True)):
-        for driver, sums in evidence.drivers.items():
-            if of_station and driver not in STATION_DRIVERS:
-                continue
-            log_e = sums.log_e
-            for index in np.flatnonzero(log_e >= state.needed(driver, of_station=of_station)):
-                at = int(index) + (state.sensor.size if of_station else 0)
-                out.append(Alarm(driver, at, state.night, len(state.order), float(log_e[index])))
-    return out
-
-
-def held(state: Evidences, alarm: Alarm) -> bool:
-    """Whether a station may cause an alarm: its driver is constant within a lot, and the effect wanders or differs by station."""
-    sensor, wander = state.sensor, state.sensor.wander
-    if alarm.index >= sensor.size or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT, STATION}:
-        return False  # judged within lots, or explicitly attributed to the station
-    if alarm.driver == MEAN:
-        of_station = ~sensor.shared_by_stations() | sensor.guarded
-    else:
-        walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
-        of_station = walk > WALK_FROM
-    if alarm.index < sensor.count or sensor.effects is None:
-        return bool(of_station[alarm.index])
-    # an effect judged by all its columns is held if columns and axes that would be held contribute more than a fifth
-    of_effect, sums = sensor.effects == alarm.index - sensor.count, sensor.drivers[alarm.driver]
-    carried = of_effect * over(sums.s[: sensor.count] ** 2, sums.v[: sensor.count])
-    return float(carried[of_station].sum()) > _MOST_HELD * float(carried.sum())
 
 
 def brought_up(source: DiscoveryArchive) -> Evidences:
     """The evidence of the archive, updated with runs scored and revoked since the last night."""
     folder = source.folder()
     with alone(folder, wait=True):
-        nights = _nights(folder)
+        nights = [files.read_json(path) for path in _listed(folder / "nights") if path.name.endswith(".json")]
         state = stored_state(source, folder, nights)
         if state is None:
             state = _replayed(source, nights)
         gone = [run for run in state.order if run in source.revoked]
         if gone:
             remaining = [run for run in state.order if run not in source.revoked]
-            grown = grown_by_days(source, fresh(source), remaining)
+            grown = grown_by_days(source, Evidences.fresh(source), remaining)
             grown.taken_out, grown.night = [*state.taken_out, *gone], state.night
             grown.alarms = [*state.alarms, *state.unknown(grown.alarms)]
             state = grown
@@ -114,22 +64,21 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
         return state
 
 
-def _nights(folder: Place) -> list[dict[str, Any]]:
-    top = folder / "nights"
-    paths = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
-    return [files.read_json(path) for path in paths if path.name.endswith(".json")]
+def _listed(folder: Place) -> list[Place]:
+    """What a folder holds, by name; nothing where it is not there."""
+    return sorted(folder.iterdir(), key=lambda path: path.name) if folder.is_dir() else []
 
 
 def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> Evidences:
     """The evidence, computed again in the order of the ledger; lots without scores or removed later are left out."""
-    state = fresh(source)
-    out = {run for night in nights for run in night["taken_out"]}
-    for night in nights:
-        runs = [run for run in night["runs"] if run in source.store.rows and run not in out]
-        state = grown_by_days(source, state, runs)
+    state = Evidences.fresh(source)
     state.taken_out = [run for night in nights for run in night["taken_out"]]
+    out = set(state.taken_out)
+    for night in nights:
+        runs = [run for run in night["runs"] if run in source.store.heads and run not in out]
+        state = grown_by_days(source, state, runs)
     # an alarm that was raised remains, even if a run that contributed to it was removed since
-    index = {_text_of(state, at): at for at in range(state.sensor.size + state.station.count)}
+    index = {str(hypothesis): at for at, hypothesis in enumerate(state.hypotheses)}
     state.alarms += state.unknown(
         Alarm(alarm["driver"], index[alarm["column"]], night["night"], alarm["lots"], alarm["log_e"])
         for night in nights
@@ -157,9 +106,14 @@ def _write(
         "lots": len(state.order),
         "hypotheses": len(state.sensor.drivers) * state.sensor.size + len(STATION_DRIVERS) * state.station.count,
         "alarms": [
-            {"driver": a.driver, "column": _text_of(state, a.index), "lots": a.lots, "log_e": round(a.log_e, 2)}
-            for a in state.alarms
-            if a.night > before
+            {
+                "driver": alarm.driver,
+                "column": str(state.hypotheses[alarm.index]),
+                "lots": alarm.lots,
+                "log_e": round(alarm.log_e, 2),
+            }
+            for alarm in state.alarms
+            if alarm.night > before
         ],
         "largest": {name: round(float(sums.log_e.max()), 2) for name, sums in state.sensor.drivers.items()},
         "state": files.hash_of(data),
@@ -169,50 +123,37 @@ def _write(
     files.publish(folder / "state", derived.framed(data))
 
 
-def _text_of(state: Evidences, index: int) -> str:
-    effect, column, axis = hypothesis(state, index)
-    return f"{effect}.{column}" + (f".{axis}" if axis else "") if column >= 0 else effect
-
-
-_VERSION = 2  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
-_GROWN = 1.05  # growth of the number of lots from which on the naming is repeated
-
-
-def alarm_key(state: Evidences) -> list[str]:
-    """The open alarms of a state as text: while they do not change, the names do not either."""
-    return sorted(f"{alarm.driver} {alarm.index}" for alarm in state.alarms if not held(state, alarm))
-
-
 def found_before(source: DiscoveryArchive, state: Evidences) -> tuple[list[DiscoveryRow], list[UnexplainedRow]] | None:
     """Discoveries and unexplained dependences of the last night; None if alarms or the number of lots changed too much."""
     before = _found(source.folder())
-    if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
+    if before["alarms"] != _alarms(state) or len(state.order) > _GROWN * before["lots"]:
         return None
     return before["discoveries"], before["unexplained"]
 
 
 def discovered_before(archive: Archive) -> list[tuple[str, int]]:
     """Kinds of devices with stored discoveries, named or not, and their number; nothing is evaluated."""
-    top = archive.root / FOLDER
-    folders = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
-    found = {folder.name: _found(folder) for folder in folders if folder.name not in {"scores", "lock"}}
-    counts = {name: len(stored["discoveries"]) + len(stored["unexplained"]) for name, stored in found.items() if stored}
+    found = {folder.name: _found(folder) for folder in _listed(archive.root / FOLDER)}
+    counts = {name: len(stored["discoveries"]) + len(stored["unexplained"]) for name, stored in found.items()}
     return [(name, count) for name, count in counts.items() if count]
 
 
-def _found(folder: Place) -> dict[str, Any] | None:
-    """The stored findings of a kind of device, and their number of lots; None where there are none."""
+def _alarms(state: Evidences) -> list[str]:
+    """The alarms that are discoveries, as text: while they do not change, the names do not either."""
+    return sorted(f"{alarm.driver} {alarm.index}" for alarm in state.judged(held=False))
+
+
+def _found(folder: Place) -> dict[str, Any]:
+    """The stored findings of a kind of device, their number of lots and of ids."""
     path = folder / "found"
-    if not path.is_file():
-        return None
-    data, standing = derived.unframed(path)
+    data, standing = derived.unframed(path) if path.is_file() else (b"", "")
     if standing != derived.SOUND:
-        return None
+        return _NOTHING
     found: dict[str, Any] = json.loads(data)
     if found.get("version") == _VERSION:
         return found
-    numbers = [int(row["id"][1:]) for row in found["discoveries"]]
-    return {**found, "unexplained": [], "lots": 0, "alarms": None, "ids": max(numbers, default=0)}
+    rows = found["discoveries"]
+    return {**_NOTHING, "discoveries": rows, "ids": max((int(row["id"][1:]) for row in rows), default=0)}
 
 
 def remembered(
@@ -222,10 +163,9 @@ def remembered(
 
     keep : store the findings, so that they are not new the next time; not for an evaluation of a part of the archive
     """
-    stored = _found(source.folder()) or {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0}
-    known: list[dict[str, Any]] = [*stored["discoveries"], *stored["unexplained"]]
+    stored = _found(source.folder())
+    left: list[dict[str, Any]] = [*stored["discoveries"], *stored["unexplained"]]
     rows = [*document["discoveries"], *document["unexplained"]]
-    left = list(known)
     document["new"] = []
     for row in rows:
         row["id"] = ""
@@ -245,12 +185,10 @@ def remembered(
         "unexplained": document["unexplained"],
         "lots": len(state.order),
         "ids": stored["ids"] + len(document["new"]),
-        "alarms": alarm_key(state),
+        "alarms": _alarms(state),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    if not keep:
-        return document
-    if stored.get("alarms") != found["alarms"] or found["lots"] > _GROWN * stored["lots"]:
+    if keep and (stored["alarms"] != found["alarms"] or found["lots"] > _GROWN * stored["lots"]):
         files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(found), sort_keys=True).encode()))
     return document
 

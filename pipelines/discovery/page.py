@@ -3,14 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.discovery.evidence import INSIDE, MEAN, STATION
+from inertial.discovery.evidence import MEAN, STATION
 from inertial.discovery.running_sums import Sums
 from inertial.frames import force_from_angles
 from inertial.uncertainty.rounding import short
+from pipelines.discovery.discoveries import Discoveries, plain
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
-from pipelines.discovery.evidence_state import hypothesis
-from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
-from pipelines.discovery.findings import Findings
+from pipelines.discovery.sentences import headline, scope_text, support_text, unexplained_text
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, still, svg_text
 from pipelines.drawing.chart import Role, level, symmetric
 from pipelines.drawing.mollweide import project, sphere
@@ -20,35 +19,29 @@ MOST_LEVELS = 30
 FAINT = 0.5  # evidence, in powers of ten, up to which nothing is drawn
 
 
-def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
+def charts_of(found: Discoveries, document: DiscoverDocument) -> dict[str, Chart]:
+    """All charts of the discoveries, by name."""
+    charts = {f"levels-{row['id']}": _levels_chart(row) for row in document["discoveries"] if len(row["levels"]) > 1}
+    charts |= _growth_charts(found, document) | _strongest_chart(found)
+    charts |= {"reach": _reach_chart(document)} if document["reach"] else {}
+    return charts | {f"left-{row['id']}": _map_chart(row) for row in document["unexplained"] if row["map"]}
+
+
+def render(found: Discoveries, document: DiscoverDocument, archive: str) -> str:
     """The page as one HTML text without other files."""
-    grown = growth_charts(findings, document)
-    shown = [
-        {
-            "id": row["id"],
-            "headline": headline(row),
-            "scope": scope_text(row),
-            "row": row,
-            "levels": still(svg_text(levels_chart(row))) if row["kind"] == "levels" and row["levels"] else "",
-            "grown": still(svg_text(grown[f"grown-{row['id']}"])) if f"grown-{row['id']}" in grown else "",
-        }
-        for row in document["discoveries"]
-    ]
     return template("discoveries.html").render(
         archive=archive,
         document=document,
-        shown=shown,
-        unexplained=[
-            (unexplained_text(row), still(svg_text(map_chart(row))) if row["map"] else "")
-            for row in document["unexplained"]
-        ],
-        strongest="" if (strongest := strongest_chart(findings)) is None else still(svg_text(strongest)),
-        reach=still(svg_text(reach_chart(document, len(findings.state.order)))) if document["reach"] else "",
         short=short,
+        charts={name: still(svg_text(chart)) for name, chart in charts_of(found, document).items()},
+        headline=headline,
+        scope=scope_text,
+        support=support_text,
+        unexplained=unexplained_text,
     )
 
 
-def levels_chart(row: DiscoveryRow) -> Chart:
+def _levels_chart(row: DiscoveryRow) -> Chart:
     """The levels of a driver in order of size, with 95 % intervals."""
     levels = sorted(row["levels"][:MOST_LEVELS], key=lambda entry: entry["size_ug"])
     position = np.arange(len(levels), dtype=np.float64)
@@ -63,7 +56,7 @@ def levels_chart(row: DiscoveryRow) -> Chart:
     return Chart(f"{row['recommended']} by {row['driver']}", (plot,), height=280)
 
 
-def map_chart(row: UnexplainedRow) -> Chart:
+def _map_chart(row: UnexplainedRow) -> Chart:
     """A difference by a driver that no effect of the catalogue explains, over the sphere of the force."""
     outer, inner, size, error = np.array(row["map"]).T
     force = force_from_angles(np.radians(outer), np.radians(inner))
@@ -78,9 +71,9 @@ def map_chart(row: UnexplainedRow) -> Chart:
     return Chart("Left by every effect of the catalogue", (sphere(title, (points,)),), 1, scale, height=260, note=note)
 
 
-def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, Chart]:
+def _growth_charts(found: Discoveries, document: DiscoverDocument) -> dict[str, Chart]:
     """Growth of the evidence of each discovery from lot to lot, by ``grown-<id>``."""
-    known = {(discovery.name.effects[0], discovery.drivers[0]): discovery.carried for discovery in findings.discoveries}
+    known = {(discovery.name.effects[0], discovery.drivers[0]): discovery.carried for discovery in found.named}
     charts: dict[str, Chart] = {}
     for row in document["discoveries"]:
         carried = known.get((row["recommended"], row["driver"]))
@@ -102,23 +95,23 @@ def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, C
     return charts
 
 
-def strongest_chart(findings: Findings) -> Chart | None:
-    """The largest evidence of each effect by each driver, in powers of ten; None if there is none to draw."""
-    state, effects = findings.state, findings.pool.effects
+def _strongest_chart(found: Discoveries) -> dict[str, Chart]:
+    """The largest evidence of each effect by each driver, in powers of ten; nothing where there is none to draw."""
+    state, effects = found.state, found.source.pool.effects
     if not state.order:
-        return None
-    drivers = list(dict.fromkeys(name.removesuffix(INSIDE) for name in state.sensor.drivers))
+        return {}
+    drivers = list(dict.fromkeys(plain(name) for name in state.sensor.drivers))
     drivers.sort(key=lambda name: (name not in {MEAN, STATION}, name))
+    of_hypothesis = [effects.index(hypothesis.effect) for hypothesis in state.hypotheses[: state.sensor.size]]
     grid = np.zeros((len(effects), len(drivers)))
     for name, sums in state.sensor.drivers.items():
-        column = drivers.index(name.removesuffix(INSIDE))
+        column = drivers.index(plain(name))
         # evidence with a higher threshold is reduced by the difference of the thresholds
-        for index, log_e in enumerate(sums.log_e - state.needed(name) + state.least_needed):
-            row = effects.index(hypothesis(state, index)[0])
-            grid[row, column] = max(grid[row, column], log_e / np.log(10.0))
+        above = sums.log_e - state.needed(name)[: sums.s.size] + state.least_needed()
+        np.maximum.at(grid[:, column], of_hypothesis, above / np.log(10.0))
     if grid.max(initial=0.0) <= FAINT:
-        return None
-    needed = state.least_needed / np.log(10.0)
+        return {}
+    needed = state.least_needed() / np.log(10.0)
     traces: list[Trace] = []
     shown: tuple[tuple[str, Role, NDArray[np.bool_]], ...] = (
         ("beyond the threshold", "before", grid >= needed),
@@ -130,11 +123,12 @@ def strongest_chart(findings: Findings) -> Chart | None:
         at = columns.astype(float), rows.astype(float)
         traces.append(Trace(name, *at, role=role, symbol="square", size=9.0, texts=texts))
     plot = Plot("", PlotAxis("driver", names=tuple(drivers)), PlotAxis("", names=tuple(effects)), tuple(traces))
-    return Chart("Evidence by effect and driver", (plot,), height=max(260, 18 * len(effects) + 70))
+    return {"strongest": Chart("Evidence by effect and driver", (plot,), height=max(260, 18 * len(effects) + 70))}
 
 
-def reach_chart(document: DiscoverDocument, lots: int) -> Chart:
+def _reach_chart(document: DiscoverDocument) -> Chart:
     """Smallest detectable size against the number of lots, with the discoveries as points."""
+    lots = document["pooled"]["lots"]
     grid = np.geomspace(30.0, max(4.0 * lots, 120.0), 40)
     best: dict[str, list[float]] = {}
     for row in document["reach"]:

@@ -11,8 +11,8 @@ from inertial.counts import number_of
 from pipelines.archive.files import ELSEWHERE, json_bytes, publish
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.documents import DiscoverDocument
-from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 from pipelines.discovery.page import render
+from pipelines.discovery.sentences import headline, scope_text, unexplained_text
 from pipelines.orchestrator.archive_address import archive_of
 from pipelines.tables.json_values import json_value
 
@@ -25,7 +25,7 @@ def look(archive: str | None, device: str, pages: Path, workers: int) -> Discove
     store = archive_of(archive)
     looked = discovered(store, Look(device=device, workers=workers))
     path = pages / f"discover-{datetime.now(UTC).date().isoformat()}"
-    page = render(looked.findings, looked.document, str(store.root))
+    page = render(looked.found, looked.document, str(store.root))
     publish(path.with_suffix(".html"), page.encode(), "discover", ELSEWHERE)
     publish(path.with_suffix(".json"), json_bytes(json_value(looked.document)), "discover", ELSEWHERE)
     return looked.document

@@ -199,4 +199,6 @@ def test_a_thermometer_that_is_off_in_one_soak_is_no_effect_of_the_sensors(tmp_p
     assert "bias_temperature_quadratic" in row["effects"]
     # 0.4 K in a third of the dwells, less what the linear coefficient takes of it, times 40 µg/K
     assert row["interval_ug"][0] < 0.4 * 40.0 * np.sqrt(6.0) / 6.0 / np.sqrt(3.0) < row["interval_ug"][1]
-    assert "of the thermometer" in text_of(*options, "--explain", row["id"])
+    explained = text_of(*options, "--explain", row["id"])
+    assert "of the thermometer" in explained
+    assert "confirmed" not in explained

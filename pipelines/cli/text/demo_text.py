@@ -51,7 +51,7 @@ def _print_class(document: dict[str, Any], named: str) -> None:
 def print_discovery_demo(document: DiscoveryDemo) -> None:
     """Print the story of an archive: which night something was found, what it is, and what adding it does."""
     from pipelines.cli.next_commands import command_line, print_next
-    from pipelines.discovery.figures_of_name import headline, scope_text
+    from pipelines.discovery.sentences import headline, scope_text
 
     archive = f"{document['folder']}/archive"
     say(

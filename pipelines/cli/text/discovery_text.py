@@ -6,7 +6,7 @@ from inertial.counts import number_of
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, say, short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, PopulationRow, UnexplainedRow
-from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
+from pipelines.discovery.sentences import headline, scope_text, support_text, unexplained_text
 
 _SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
 
@@ -88,7 +88,10 @@ def print_explained(row: DiscoveryRow | UnexplainedRow) -> None:
     if "nearest" in row:
         say(unexplained_text(row))
         say(f"    of all effects {row['nearest']} has the largest evidence, and does not account for it")
-        say("next: look at its map (--output), and write an effect of your own")
+        if row["map"]:
+            say("next: look at its map (--output), and write an effect of your own")
+        else:
+            say("next: measure more lots; it has a name or a map once each half of the lots predicts the other")
         return
     say(headline(row))
     say(f"    {scope_text(row)}")
@@ -98,18 +101,8 @@ def print_explained(row: DiscoveryRow | UnexplainedRow) -> None:
     other_drivers = [name for name in row["drivers"] if name != row["driver"]]
     if other_drivers:
         say(f"    nor {row['driver']} from {', '.join(other_drivers)}")
-    carried = row["carried_by"]
-    if carried["lots_for"] is not None:
-        less = short(carried["log_e_without_largest_2_percent"])
-        say(
-            f"    {short(100.0 * carried['lots_for'])} % of the lots speak for it; e^{less} without the 2 % that speak most"
-        )
-    if row["confirmed"] is None:
-        say("    not confirmed yet: fewer than 20 lots were measured since it was found")
-    else:
-        say(
-            f"    the lots since it was found {'show' if row['confirmed'] else 'do not show'} what the earlier ones predict"
-        )
+    for text in support_text(row):
+        say(f"    {text}")
     if row["kind"] == "levels":
         lines = [
             [level["level"], short(level["size_ug"]), short(level["u_ug"]), str(level["units"] or "")]

@@ -259,21 +259,14 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
     from pipelines.discovery import page
     from pipelines.discovery.discover import Look
     from pipelines.discovery.discover import discovered as looked_at
-    from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
+    from pipelines.discovery.sentences import headline, scope_text, support_text, unexplained_text
 
     looked = looked_at(Archive(request["archive"]), Look(device=str(request["device"])))
     report_progress(1, 2, "drawing")
     document = looked.document
-    charts = {f"levels-{row['id']}": page.levels_chart(row) for row in document["discoveries"] if row["levels"]}
-    charts |= page.growth_charts(looked.findings, document)
-    if (strongest := page.strongest_chart(looked.findings)) is not None:
-        charts["strongest"] = strongest
-    if document["reach"]:
-        charts["reach"] = page.reach_chart(document, document["pooled"]["lots"])
-    texts = {row["id"]: (headline(row), scope_text(row)) for row in document["discoveries"]}
-    unexplained = [unexplained_text(row) for row in document["unexplained"]]
-    charts |= {f"left-{k}": page.map_chart(row) for k, row in enumerate(document["unexplained"]) if row["map"]}
-    return {"document": document, "charts": charts, "texts": texts, "unexplained": unexplained}
+    texts = {row["id"]: (headline(row), scope_text(row), *support_text(row)) for row in document["discoveries"]}
+    texts |= {row["id"]: (unexplained_text(row),) for row in document["unexplained"]}
+    return {"document": document, "charts": page.charts_of(looked.found, document), "texts": texts}
 
 
 def address_of(finding: AuditFinding) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from long_suites import mostly_slow
 
+from benchmarks.discovery.archives import earlier_in
 from inertial.discovery.evidence import ALL, INSIDE, SLOPE, Evidence, ScoredLot
 from inertial.discovery.running_sums import FIRST, Levels, Scale, Sums
 
@@ -42,7 +43,7 @@ def lots(seed: int, number: int, change: Change = lambda lot, _: lot) -> list[Sc
 
 
 def evidence_of(given: list[ScoredLot]) -> Evidence:
-    made = Evidence(COUNT)
+    made = Evidence(COUNT, earlier_in(given))
     for lot in given:
         made.add(lot)
     return made
@@ -92,7 +93,7 @@ def test_an_effect_as_a_whole_is_found_before_its_parts_and_in_noise_is_silent()
     assert log_e[COUNT] > log_e[:COUNT].max() + 3.0
     assert log_e[COUNT + 1] < NEEDED
     assert log_e[:COUNT] == pytest.approx(evidence_of(lots(15, 150, spread)).drivers["mean"].log_e)
-    state = Evidence.restored(COUNT, made.arrays(), lambda _, __: None, columns)
+    state = Evidence.restored(COUNT, made.arrays(), columns=columns)
     assert state.drivers["mean"].log_e == pytest.approx(log_e)
 
 
@@ -164,31 +165,17 @@ def test_a_station_that_wanders_is_no_firmware_and_is_told() -> None:
 
 def test_a_state_goes_on_where_it_was() -> None:
     given = lots(6, 120, FOUND["slot"])
-    whole = evidence_of(given)
-    order: list[ScoredLot] = []
-
-    def earlier(unit: str, taken: int) -> tuple[np.ndarray, np.ndarray] | None:
-        found = [(lot, lot.units.index(unit)) for lot in order[:taken] if unit in lot.units]
-        if not found:
-            return None
-        left, information = np.zeros(COUNT), np.zeros(COUNT)
-        for lot, at in found:
-            total = lot.own.sum(axis=0)
-            left += lot.score[at] - lot.own[at] * lot.score.sum(axis=0) / total
-            information += lot.own[at] * (1.0 - lot.own[at] / total)
-        return left, information
-
-    first = Evidence(COUNT, earlier)
+    whole, order = evidence_of(given), list[ScoredLot]()
+    first = Evidence(COUNT, earlier_in(order))
     for lot in given[:70]:
         first.add(lot)
         order.append(lot)
-    again = Evidence.restored(COUNT, first.arrays(), earlier)
+    again = Evidence.restored(COUNT, first.arrays(), earlier_in(order))
     for lot in given[70:]:
         again.add(lot)
         order.append(lot)
     for name, sums in whole.drivers.items():
-        tight = 1e-9 if name != "unit" else 0.5  # kept sums of units are bounded, those of the callback are not
-        assert again.drivers[name].log_e == pytest.approx(sums.log_e, abs=tight, rel=tight), name
+        assert again.drivers[name].log_e == pytest.approx(sums.log_e, abs=1e-9, rel=1e-9), name
 
 
 def test_the_first_lots_are_held_back() -> None:

@@ -1,5 +1,6 @@
 """Names of what an archive holds, on lots that are scored from simulated dwells."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,6 +9,7 @@ from long_suites import mostly_slow
 
 from benchmarks.discovery.archives import ArchiveMaker, Hidden, Result, Setting
 from benchmarks.discovery.lots import WORLDS, bank
+from inertial.discovery.evidence import ScoredLot
 from inertial.discovery.naming import Pool
 
 NEEDED = 11.5
@@ -20,7 +22,7 @@ def maker() -> ArchiveMaker:
 
 
 def pool() -> Pool:
-    return Pool(maker().columns, maker().size.reshape(-1), *maker().products)
+    return Pool(maker().products)
 
 
 HIDDEN = [
@@ -52,11 +54,24 @@ def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) 
     assert float(np.mean(pool().carried(result.lots, driver, effect) > 0.0)) > 0.6
 
 
+def test_an_effect_of_units_measured_again_is_named_by_them() -> None:
+    """The units of a wafer in forty lots are taken for one and the same."""
+
+    def again(lot: ScoredLot) -> ScoredLot:
+        wafers = lot.levels["wafer"]
+        return replace(lot, units=tuple(f"{w}-{wafers[:k].count(w)}" for k, w in enumerate(wafers)))
+
+    lots = [again(lot) for lot in archive("third_order", "wafer").lots]
+    (name, *_), unnamed = pool().names(lots, {("unit", "third_order")}, NEEDED)
+    assert ("third_order" in name.effects, name.drivers, unnamed) == (True, ("unit",), [])
+    assert pool().confirmed(lots[:20], lots[20:], "unit", "third_order")[0] == pytest.approx(1.0, abs=0.2)
+
+
 @pytest.mark.slow
 def test_an_effect_in_the_model_of_every_lot_leaves_nothing_of_it() -> None:
     result = archive("third_order", "wafer")
     assert result.alarms
-    own, count = pool(), len(maker().columns)
+    own, count = pool(), len(maker().products.columns)
     at = own.places("third_order")[0] + count * np.arange(3)
     near = own.places("odd_quadratic")[0] + count * np.arange(3)
     changed = [own.with_effect(lot, "third_order") for lot in result.lots]

@@ -39,7 +39,7 @@ def test_score_over_information_is_the_coefficient_of_a_fit(name: str) -> None:
     problem = Problem(lot)
     model = Model(problem, terms_of(catalogue.get_all(EFFECTS), problem))
     fall = model.space.gain(Term(effect).candidate(problem)).by_block[:, 0].reshape(8, 3)
-    assert scores.score[..., 0] ** 2 / scores.own[..., 0] == pytest.approx(fall, rel=1e-8)
+    assert scores.score**2 / scores.own == pytest.approx(fall, rel=1e-8)
     # a second way: generalised least squares with the covariance written out
     space, block = model.space, 4
     white = space.covariance.whiten(
@@ -47,7 +47,7 @@ def test_score_over_information_is_the_coefficient_of_a_fit(name: str) -> None:
     )
     fitted = np.linalg.lstsq(white[block][:, 1:], white[block][:, 0], rcond=None)[0][-1]
     unit, axis = divmod(block, 3)
-    assert scores.score[unit, axis, 0] / scores.own[unit, axis, 0] == pytest.approx(fitted, rel=1e-6)
+    assert scores.score[unit, axis] / scores.own[unit, axis] == pytest.approx(fitted, rel=1e-6)
 
 
 def test_an_error_of_the_table_leaves_the_scores_beside_free_errors_of_the_station() -> None:
@@ -63,12 +63,13 @@ def test_an_error_of_the_table_leaves_the_scores_beside_free_errors_of_the_stati
     free, bound = (_moved(*pair) for pair in ((before, after), alone))
     assert free < 1.0  # the noise that is estimated beside the error is another one
     assert bound > 5.0
-    assert np.abs(after.station_score - before.station_score).max() / np.sqrt(before.station_information.max()) > 5.0
+    moved = np.abs(after.of_station[0] - before.of_station[0])
+    assert moved.max() / np.sqrt(before.of_station[1].max()) > 5.0
 
 
 def _moved(before: LotScores, after: LotScores) -> float:
     """Largest change of a lot's sums, in standard deviations."""
-    sigma = np.sqrt(np.diagonal(before.lot).reshape(3, -1))
+    sigma = np.sqrt(before.information)
     return float(
         (np.abs(after.score.sum(axis=0) - before.score.sum(axis=0)) / np.where(sigma > 0.0, sigma, np.inf)).max()
     )
@@ -76,18 +77,18 @@ def _moved(before: LotScores, after: LotScores) -> float:
 
 def test_a_hardening_spring_is_a_cubic_of_all_units_and_falls_behind() -> None:
     scores = scores_of(lot_of(13, Hidden("W01", 300e-6)), EFFECTS)
-    at = scores.columns.index(("third_order", 0))
-    z = scores.score.sum(axis=0)[:, at] / np.sqrt(np.diagonal(scores.lot).reshape(3, -1)[:, at])
+    at = scores.products.columns.index(("third_order", 0))
+    z = scores.score.sum(axis=0).reshape(3, -1)[:, at] / np.sqrt(scores.information.reshape(3, -1)[:, at])
     assert (z < -20.0).all()
 
 
 def test_what_no_lot_can_tell_has_no_information() -> None:
     scores = scores_of(lot_of(14), EFFECTS)
-    names = [name for name, _ in scores.columns if name != SHAPE]
+    names = [name for name, _ in scores.products.columns if name != SHAPE]
     assert all(issubclass(type(catalogue.get(name)), SensorEffect) for name in names)
     assert not set(names) & set(EFFECTS)
     at = names.index("bias_temperature_cubic")  # three temperatures: the cubic is the quadratic and the line
-    information = np.diagonal(scores.lot).reshape(3, -1)
+    information = scores.information.reshape(3, -1)
     assert information[:, at] == pytest.approx(0.0, abs=1e-6 * information[0, names.index("third_order")])
     again = scores_of(lot_of(14), EFFECTS)
     assert again.score == pytest.approx(scores.score)
@@ -97,10 +98,9 @@ def test_a_size_is_the_rms_that_an_effect_leaves_also_in_outputs_that_wander() -
     """White noise of 8 µg and a wander of 36 µg; springs that differ from unit to unit, which no error of the station does."""
     size = 0.02 * np.tile([[1.0], [-1.0]], (4, 3))
     without, sprung = Lots(WORLDS[0], 5).scored(), Lots(WORLDS[0], 5).scored("third_order", size)
-    k = sprung.columns.index(("third_order", 0))
-    with_it, before = ((one.score[:, :, k], one.own[:, :, k]) for one in (sprung, without))
-    coefficients = with_it[0] / with_it[1] - before[0] / before[1]
-    found = np.abs(coefficients) * sprung.size[:, k]
+    at = sprung.products.columns.index(("third_order", 0)) + len(sprung.products.columns) * np.arange(3)
+    with_it, before = (scores.score[:, at] / scores.own[:, at] for scores in (sprung, without))
+    found = np.abs(with_it - before) * sprung.products.size[at]
     np.testing.assert_allclose(found, 1e-6 * FLOOR_UG * np.abs(size), rtol=0.15)
 
 

@@ -15,7 +15,9 @@ from inertial.planning.ranges import UnseenRange
 from pipelines.archive import Archive
 from pipelines.cli import flowing
 from pipelines.cli.text.demo_text import print_discovery_demo
+from pipelines.cli.text.discovery_text import print_explained
 from pipelines.diagnosis.confirmation import fall_of
+from pipelines.discovery.sentences import support_text
 from pipelines.jobs.job import Request
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
@@ -122,3 +124,13 @@ def test_the_steps_of_a_demonstration_are_numbered_as_they_are_shown(capsys: pyt
     nothing = {"folder": "line", "lots": 60, "discoveries": [], "compared": [], "hidden": hidden, "found": False}
     print_discovery_demo(cast("Any", {**nothing, "wafer_named": False}))
     assert re.findall(r"^(\d)\. ", capsys.readouterr().out, re.MULTILINE) == ["1", "2"]
+
+
+def test_a_discovery_asks_for_what_can_be_done(capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a map there is none to look at; an error of the references is not to be confirmed by later lots."""
+    row = {"id": "D1", "since": "2026-03-14", "lots_then": 40, "driver": "wafer", "level": "", "axes": ["x"], "map": []}
+    print_explained(cast("Any", {**row, "log_e": 12.0, "nearest": "third_order"}))
+    text = capsys.readouterr().out
+    assert "measure more lots" in text
+    assert "--output" not in text
+    assert support_text(cast("Any", {"carried_by": {"lots_for": None}, "confirmed": None})) == []

@@ -94,7 +94,7 @@ def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:
         lot = sound_lot(table, None, effects)[2]
         by_search, by_verdict = scores_of(lot, effects), scores_of(lot, effects, shares=shares)
         np.testing.assert_allclose(by_verdict.score, by_search.score, rtol=1e-9)
-        np.testing.assert_allclose(by_verdict.lot, by_search.lot, rtol=1e-9)
+        np.testing.assert_allclose(by_verdict.products.lot, by_search.products.lot, rtol=1e-9)
 
 
 @pytest.fixture(scope="module")

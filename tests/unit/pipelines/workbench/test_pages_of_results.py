@@ -87,7 +87,6 @@ def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch:
     assert client.get("/discover/levels-D7.csv").status_code == 422
     document = found["document"]
     found["document"] = {**document, "discoveries": [], "pooled": {**document["pooled"], "lots": 0}}
-    found["unexplained"] = []
     assert "No lot can be compared" in client.get("/discover").text
 
 
