@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.counts import number_of
+from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT
 from pipelines.archive import Archive, files
 from pipelines.archive.attributes import FOLDER, attribute_files, known_attributes
 from pipelines.archive.locks import alone
@@ -34,13 +35,17 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
     Raises
     ------
     WrongUse
-        The key is missing, empty or has conflicting values, or no column of an attribute is left.
+        The key is missing, empty or has conflicting values, no column of an attribute is left, or one has a driver's name.
     """
     archive.refuse_none()
     if twice := table.columns[table.columns.duplicated()].tolist():
         raise WrongUse(f"attributes: {source} has two columns '{twice[0]}', names must differ; rename or remove one")
     key = _key_column(table, by, source)
     named = [str(name) for name in table.columns if name != key]
+    if taken := [name for name in named if name in (MEAN, DATE, STATION, SLOT, UNIT)]:
+        raise WrongUse(
+            f"attributes: {source} has a column '{taken[0]}', which is judged as every run records it; rename or remove it"
+        )
     refused = [name for name in named if name.lower() in NOT_DRIVERS]
     names = [name for name in named if name not in refused]
     if not names:
