@@ -5,9 +5,11 @@ import pytest
 from long_suites import mostly_slow
 from made_worlds import BASE, Noise, World, lot_in, make
 
+from benchmarks.large_lots import MODEL, many_units
 from inertial import effects as catalogue
 from inertial import poses
 from inertial.criticism import adequacy, noise_draws
+from inertial.criticism import diagnosis as criticism
 from inertial.criticism.drivers import drivers_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.jumps import _evenness
@@ -101,6 +103,14 @@ def test_random_walk_raises_the_sizes_that_are_named_and_the_document_says_so() 
         for f in (0.4, 2.0)
     ]
     assert named == [False, True]
+
+
+@pytest.mark.slow
+def test_an_effect_that_a_walk_follows_from_dwell_to_dwell_is_recommended() -> None:
+    lot = many_units(16, 3, "quadratic", 0.5)
+    named = criticism.diagnose(lot, MODEL, np.random.default_rng(1)).named
+    assert [(group.effects.ids[0], group.predicts) for group in named] == [("bias_temperature_quadratic", True)]
+    assert named[0].heldout_after < 0.99 * named[0].heldout_before
 
 
 UNITS = 4
