@@ -26,7 +26,7 @@ def contradiction(lot: Lot) -> tuple[str, Lot]:
     The text is empty if the poses agree with the outputs, or if nothing explains the outputs of most units better: those of a
     defective sensor, which no pose explains, are left to the search for effects.
     """
-    there: Flags = np.isfinite(lot.error).all(axis=(0, 2))
+    there = np.asarray(np.isfinite(lot.error).all(axis=(0, 2)))
     if lot.radial or np.count_nonzero(there) <= _SPHERE:
         return "", lot
     scale = np.ones((len(lot.output), 1)) if lot.scale is None else lot.scale

@@ -269,7 +269,8 @@ def _changing(run: ExaminedRun, searched: SearchResult) -> EffectSearch:
     run.beside, run.removed = [term for term in run.beside if term not in parts], []
     base, varied = run.model(), {"force", "time", "temperature"}
     fields = Candidates(base.problem, candidates_of(base, run.effects), alternatives())
-    added = tuple(t for t in searched.added if drivers_of(run.lot.state, t.effect) & varied == {"force"})
+    physics = [(t, t.effect) for t in searched.added if not isinstance(t.effect, Handling)]
+    added = tuple(t for t, effect in physics if drivers_of(run.lot.state, effect) & varied == {"force"})
     time = next(driver for driver in looks_of(base.problem) if driver.name == "time_s")
     curved = base.with_curves(time.candidate.of_blocks[:, :, 0, :])
     log_p = searched.ladder[0].log_p + float(np.log(fields.looks))
