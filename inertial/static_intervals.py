@@ -36,7 +36,12 @@ class StaticIntervals:
 
 
 def find(
-    x: ArrayLike, rate_hz: float, *, window_s: float = 1.0, shortest_s: float = 1.0, threshold: float | None = None
+    x: ArrayLike,
+    rate_hz: float,
+    *,
+    window_s: float = 1.0,
+    shortest_s: float = 1.0,
+    threshold: float | None = None,
 ) -> StaticIntervals:
     """Static intervals of a record of three axes.
 

@@ -134,16 +134,19 @@ TABLES: dict[str, Table] = {
             "kind": text(),
             "record": Column("int64", low=-1),  # −1: none
             **each(ANY_TEXT, "reason", "action"),
-        }
+        },
     ),
     "soaks": Table(
         {
             "time_s": NUMBER,
             "record": WHOLE,
             **each(NUMBER, "target_C", "seconds", "air_overshoot_K", "device_overshoot_K"),
-        }
+        },
     ),
-    "verdicts": Table({**_UNIT, "slot": WHOLE, "refused": FLAG, **each(ANY_TEXT, "fault", "reason")}, key=("unit",)),
+    "verdicts": Table(
+        {**_UNIT, "slot": WHOLE, "refused": FLAG, **each(ANY_TEXT, "fault", "reason")},
+        key=("unit",),
+    ),
     "dwells": Table(
         {**_UNIT, "dwell": WHOLE, "time_s": NUMBER},
         measured=(*_OUT, *_SD, *_FORCE, "outer_deg", "inner_deg", "unit_C", "chamber_C"),
@@ -160,7 +163,8 @@ TABLES: dict[str, Table] = {
         key=("unit", "axis", "effect", "name"),
     ),
     "covariance": Table(
-        {**_UNIT, **_AXIS, **each(WHOLE, "row", "column"), "value": NUMBER}, key=("unit", "axis", "row", "column")
+        {**_UNIT, **_AXIS, **each(WHOLE, "row", "column"), "value": NUMBER},
+        key=("unit", "axis", "row", "column"),
     ),
     "residuals": Table(
         {
@@ -322,7 +326,8 @@ TABLES: dict[str, Table] = {
     ),
     # of the coefficients of all axes in one vector, x before y before z, lower triangle
     "budget_covariance": Table(
-        {**_UNIT, **each(WHOLE, "row", "column"), "value": NUMBER}, key=("unit", "row", "column")
+        {**_UNIT, **each(WHOLE, "row", "column"), "value": NUMBER},
+        key=("unit", "row", "column"),
     ),
     # on the model of the run: the effects of the fit; one row, none without a model
     "verdict": Table(

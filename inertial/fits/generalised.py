@@ -59,7 +59,13 @@ class Series:
     """
 
     def __init__(
-        self, h: Array, s: Array, z: Array, profile: Array, kernels: tuple[Array, ...], missing: Flags | None = None
+        self,
+        h: Array,
+        s: Array,
+        z: Array,
+        profile: Array,
+        kernels: tuple[Array, ...],
+        missing: Flags | None = None,
     ) -> None:
         self._width = h.shape[-1]
         lacking = 0 if missing is None else np.count_nonzero(missing, axis=-1)[..., None]

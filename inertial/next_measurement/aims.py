@@ -14,7 +14,14 @@ from inertial.estimation.model import Model
 from inertial.estimation.penalty import freedom, price
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term, with_turn_on
-from inertial.next_measurement.separation import Apart, Rivals, apart, predictions, residual_squares, widened
+from inertial.next_measurement.separation import (
+    Apart,
+    Rivals,
+    apart,
+    predictions,
+    residual_squares,
+    widened,
+)
 from inertial.planning.sequences import SequenceStep, StationPace
 
 UNLUCKY = 1.65

@@ -114,7 +114,14 @@ def against_mean(variance: Array, gain: Array, kind: tuple[Array, float]) -> Arr
     return variance * (of_mean - 2.0 * gain @ along)
 
 
-def of_a_day(record: Array, wander: Array, time: Array, *, slowest: float = 1.0, widened: float = 1.0) -> Array:
+def of_a_day(
+    record: Array,
+    wander: Array,
+    time: Array,
+    *,
+    slowest: float = 1.0,
+    widened: float = 1.0,
+) -> Array:
     """Standard uncertainty of a bias as the mean of the day after its record, from 1/f noise; the shape of ``record``.
 
     Flicker between the record and that day is added to the error of the record's mean.

@@ -25,7 +25,13 @@ NAMES: Mapping[str, str] = {
     "K": "acceleration random walk",
     "R": "ramp",
 }
-UNITS: Mapping[str, str] = {"Q": "{}·s", "N": "{}/√Hz", "B": "{}", "K": "{}/√s", "R": "{}/s"}
+UNITS: Mapping[str, str] = {
+    "Q": "{}·s",
+    "N": "{}/√Hz",
+    "B": "{}",
+    "K": "{}/√s",
+    "R": "{}/s",
+}
 """Unit of each coefficient for an output in {}; g/√Hz and g·√s are the same, K is often written g/s/√Hz."""
 
 

@@ -29,7 +29,12 @@ class GlobalRisk:
 
 
 def lot_risk(
-    mean: float, process: float, u: float, shared: float, limits: tuple[float, float], accepted: tuple[float, float]
+    mean: float,
+    process: float,
+    u: float,
+    shared: float,
+    limits: tuple[float, float],
+    accepted: tuple[float, float],
 ) -> GlobalRisk:
     """Risks over a lot whose measurements have an error in common, that of the references: X = Z − C, Y = Z + E.
 
@@ -46,7 +51,9 @@ def lot_risk(
     z, weight = _nodes(mean, process, [(limits, shared), (accepted, u)])
     good, taken = (_between(z, ends, width) for ends, width in ((limits, shared), (accepted, u)))
     return GlobalRisk(
-        float(weight @ ((1.0 - good) * taken)), float(weight @ (good * (1.0 - taken))), float(weight @ taken)
+        float(weight @ ((1.0 - good) * taken)),
+        float(weight @ (good * (1.0 - taken))),
+        float(weight @ taken),
     )
 
 

@@ -146,7 +146,12 @@ def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[Contr
 
 
 def _chart(
-    calibrations: Calibrations, rows: Index, key: tuple[str, str, str], values: Array, rules: Rules, since: float
+    calibrations: Calibrations,
+    rows: Index,
+    key: tuple[str, str, str],
+    values: Array,
+    rules: Rules,
+    since: float,
 ) -> ControlChart:
     chart = baseline(values, rules.baseline_points)
     by_rule, moving = signals(values, chart)

@@ -159,7 +159,10 @@ def _procedures(job: Job, run: Run) -> Tables:
 
 
 def _model(job: Job) -> dict[str, Any]:
-    return {"effects": job.recipe.effects, "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas]}
+    return {
+        "effects": job.recipe.effects,
+        "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas],
+    }
 
 
 def _listed(job: Job) -> dict[str, Any]:
@@ -190,7 +193,13 @@ STAGES: tuple[Stage, ...] = (
         parameters=lambda job: _model(job) | ({} if job.prior is None else {"prior": job.prior.model_dump()}),
         call=lambda job, run: fit_tables(_lot(run), job.recipe.effects, family(job.prior)),
     ),
-    Stage(name="judge", inputs=("dwells", "history"), outputs=("verdict",), parameters=_model, call=_judge),
+    Stage(
+        name="judge",
+        inputs=("dwells", "history"),
+        outputs=("verdict",),
+        parameters=_model,
+        call=_judge,
+    ),
     Stage(
         name="verify",
         inputs=_VERIFIED,

@@ -7,7 +7,15 @@ from typing import Annotated, Any
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
 from pipelines.cli.next_commands import archive_words, command_line
-from pipelines.cli.options import ArchiveOption, JsonOption, ReasonOption, RunArgument, SinceOption, TrustOption, option
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    ReasonOption,
+    RunArgument,
+    SinceOption,
+    TrustOption,
+    option,
+)
 from pipelines.cli.printing import conclude, error_console, print_table, remark, say
 from schemas.errors import ArchiveUnusable
 

@@ -265,7 +265,13 @@ def _print_waveforms(imported: Mapping[str, Any]) -> None:
         f"{_named([imported['unit']], imported['device'])}: {imported['records']} recordings, kept as run {imported['run']}"
     )
     rows = [
-        [figure["figure"], figure["axis"], short(figure["value"]), short(figure["uncertainty"]), figure["unit"]]
+        [
+            figure["figure"],
+            figure["axis"],
+            short(figure["value"]),
+            short(figure["uncertainty"]),
+            figure["unit"],
+        ]
         for figure in imported["figures"]
         if figure["identified"]
     ]

@@ -77,7 +77,10 @@ def diagnose(
 
 
 def examined(
-    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str] | None, left_out: Collection[str] = ()
+    dwells: pd.DataFrame,
+    history: pd.DataFrame | None,
+    effects: Sequence[str] | None,
+    left_out: Collection[str] = (),
 ) -> tuple[Measured, list[Fault], Diagnosis | None]:
     """Readings, data faults, and the diagnosis of the units without a fault (None if every unit has one).
 
@@ -230,7 +233,10 @@ class Examination:
 
 
 def examination(
-    table: pd.DataFrame, history: pd.DataFrame | None, judged: Sequence[str] | None, left_out: Collection[str] = ()
+    table: pd.DataFrame,
+    history: pd.DataFrame | None,
+    judged: Sequence[str] | None,
+    left_out: Collection[str] = (),
 ) -> Examination:
     """The diagnosis of dwells against a model, on one thread, because the matrices are small.
 

@@ -18,7 +18,15 @@ from pipelines.discovery import documents
 from pipelines.discovery.alarms import Alarms
 from pipelines.discovery.documents import DiscoveryRow, DriverRow, HeldAlarm, ReachRow, UnexplainedRow
 from pipelines.discovery.evidence_state import ALPHA, Alarm, hypothesis
-from pipelines.discovery.figures_of_name import Scope, by_axis, levels_of, next_of, plain, size_of, without_largest
+from pipelines.discovery.figures_of_name import (
+    Scope,
+    by_axis,
+    levels_of,
+    next_of,
+    plain,
+    size_of,
+    without_largest,
+)
 from pipelines.discovery.lot_source import AXES, OWN_TEMPCO, SEASON
 from pipelines.discovery.nights import held
 from pipelines.discovery.reference_rows import PROPORTIONAL, station_row, thermometer_row
@@ -115,7 +123,10 @@ class Findings(Alarms):
         return carried, (factor, error) if able >= LATER else None
 
     def document(
-        self, before: tuple[list[DiscoveryRow], list[UnexplainedRow]] | None = None, *, looking_back: bool = False
+        self,
+        before: tuple[list[DiscoveryRow], list[UnexplainedRow]] | None = None,
+        *,
+        looking_back: bool = False,
     ) -> documents.DiscoverDocument:
         """The findings as a document.
 

@@ -332,7 +332,12 @@ def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, G
 
 
 def _output(
-    content: Content, numeric: dict[str, Array], names: list[str], sphere: triads.Sphere | None, *, means: bool
+    content: Content,
+    numeric: dict[str, Array],
+    names: list[str],
+    sphere: triads.Sphere | None,
+    *,
+    means: bool,
 ) -> Guess:
     """The unit of the outputs ``names``: that which they state, or that which the numbers of three axes show.
 

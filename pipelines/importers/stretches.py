@@ -90,7 +90,12 @@ class _SearchOptions:
 
 
 def stretches(
-    labels: Sequence[str] | None, output: Array, time: Array, breaks: Sequence[int], mapping: Mapping, where: str
+    labels: Sequence[str] | None,
+    output: Array,
+    time: Array,
+    breaks: Sequence[int],
+    mapping: Mapping,
+    where: str,
 ) -> Stretches:
     """The static stretches of a record that the mapping keeps.
 

@@ -21,7 +21,13 @@ from pipelines.importers.values import finite_column
 from pipelines.procedures import PROCEDURES, procedure_tables
 from pipelines.procedures.base import FromWaveforms, NominalScale
 from pipelines.procedures.figures import FigureValue, Finding, Outcome
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureRecord, ProcedureStep, UnitRecord
+from pipelines.procedures.recorded import (
+    REFERENCE,
+    Device,
+    ProcedureRecord,
+    ProcedureStep,
+    UnitRecord,
+)
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.poses import Pose

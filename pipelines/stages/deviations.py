@@ -117,7 +117,13 @@ STATISTICS = {
 
 
 def deviations(
-    statistic: Statistic, records: Array, unit: str, curve: AllanCurve, terms: NoiseTerms, *, explained: Flags
+    statistic: Statistic,
+    records: Array,
+    unit: str,
+    curve: AllanCurve,
+    terms: NoiseTerms,
+    *,
+    explained: Flags,
 ) -> Deviations:
     """A statistic of records, at those averaging times of their Allan curve for which the record is long enough.
 

@@ -13,7 +13,12 @@ from pipelines.tables.summaries import MEANS, PROCEDURE, SPREADS, STATIC, there
 from schemas.errors import DataRejected
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
-KEPT = (*("unit", "slot", "record", "kind", "pose", "soak", "duration_s"), *ANGLE_COLUMNS, *READINGS, "out_unit")
+KEPT = (
+    *("unit", "slot", "record", "kind", "pose", "soak", "duration_s"),
+    *ANGLE_COLUMNS,
+    *READINGS,
+    "out_unit",
+)
 WHERE_THERE = (BY_ATTRIBUTE["power_off"].column,)
 """Columns only of runs that switch their devices off and on."""
 

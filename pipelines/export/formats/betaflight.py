@@ -5,7 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from inertial.arrays import Array
-from pipelines.export.omissions import ACROSS, ACROSS_T, BIAS_T, SCALE, SCALE_T, comment, comment_lines
+from pipelines.export.omissions import (
+    ACROSS,
+    ACROSS_T,
+    BIAS_T,
+    SCALE,
+    SCALE_T,
+    comment,
+    comment_lines,
+)
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 
