@@ -9,6 +9,8 @@ from inertial import effects as catalogue
 from inertial.arrays import Array, Places
 from inertial.criticism.bad_or_effect import bad_beside_effects, candidates_of
 from inertial.criticism.classes import EffectClass, class_of
+from inertial.criticism.contradicted_poses import contradiction
+from inertial.criticism.drivers import looks_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
@@ -29,9 +31,12 @@ from inertial.estimation.penalty import cost_of_model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import better_placed, replaced, terms_of
 from inertial.estimation.term import Term, with_turn_on
+from inertial.planning.drivers import drivers_of
 
 _MENDED = 6  # largest number of handling errors reported for one run
 _TURNS = 3  # largest number of repeated tests of single dwells, each with a new search
+_MOMENTS = 3  # smallest number of dwells at which units change one by one before that is a course of the lot
+_CHANGE = {"unit", "dwell"}  # location of a change of one unit
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,8 @@ class ExaminedRun:
     beside : terms of handling errors that stay in the model; handled : all handling errors found; removed : bad dwells
     barred : ids of alternatives that only imitate a drift and are not searched again
     drift : the latest drift that such alternatives imitated; if there is one, curves of every kind are suspected
+    changing : whether the drift is that of most units, each of which changes at dwells of its own; it ends the search
+    contradicted : what is wrong with the poses, if they contradict the outputs; nothing else is then searched
     soak : (n,), index of the soak of each dwell, by the temperatures as measured
     louder : (units, n, axes), white standard deviation of a dwell over its axis', where it depends on the force
     """
@@ -82,6 +89,8 @@ class ExaminedRun:
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
     barred: set[str] = field(default_factory=set[str])
     drift: Unexplained | None = None
+    changing: bool = False
+    contradicted: str = ""
     soak: Places | None = None
     louder: Array | None = None
     _made: tuple[list[object], Model] | None = None
@@ -137,10 +146,15 @@ def examined(
 ) -> "tuple[ExaminedRun, EffectSearch]":
     """A run freed of bad dwells and handling errors, and the search for effects in it; ``barred`` ids are not searched."""
     run = ExaminedRun(lot, tuple(effects), barred=set(barred))
+    run.contradicted, run.lot = contradiction(lot)
+    if run.contradicted:
+        base = run.model()
+        fields = Candidates(base.problem, candidates_of(base, run.effects))
+        return run, EffectSearch(base, fields, LotPart(fields, base), SearchResult(base, (), ()))
     run.estimate_loudness()
     run.removed = bad_beside_effects(run.model(), run.effects)
     searched = mended(run)
-    for _ in range(_TURNS):
+    for _ in range(0 if run.changing else _TURNS):
         # a dwell that deviates in most units was reserved for a wrong pose; if no such error was found, it is bad in each unit
         of_all = not run.handled and not searched.result.added
         if of_all and not any_of_all(run.model()):
@@ -153,6 +167,8 @@ def examined(
             break
         run.removed = removed
         searched = mended(run)
+        if run.changing:
+            break
     return run, searched
 
 
@@ -220,12 +236,48 @@ def mended(run: ExaminedRun) -> EffectSearch:
             if run.withdraw(part, searched.added):
                 continue
             return EffectSearch(base, fields, part, searched)
+        if _of_most_units(of, searched.model, searched.handling[0]):
+            return _changing(run, searched)
         if run.was_found(searched.handling[0]) and run.withdraw(part, searched.handling):
             continue
         for term in searched.handling:
             others = [other for other in searched.handling if other is not term]
             beside = Model(of.problem, [*searched.model.terms, *others], near=searched.model.noise)
             _mend(run, of, replace(searched, model=beside if others else searched.model), term)
+
+
+def _of_most_units(fields: Candidates, model: Model, term: Term) -> bool:
+    """Whether most units show a change like that of one unit, at several dwells: it is then no event of that unit."""
+    alternative, units = term.effect, fields.problem.lot.state.time.shape[0]
+    if not isinstance(alternative, Handling) or units < _MOMENTS or not set(term.keywords) >= _CHANGE:
+        return False
+    grid, best = fields.grids[alternative.id], dict[float, dict[str, float]]()
+    for k in np.argsort(-fields.gain_of(model.space, alternative).drop).tolist():
+        best.setdefault(grid[k]["unit"], grid[k])  # units in the order of their largest gain
+    most = list(best.values())[: units // 2 + 1]
+    several = len({location["dwell"] for location in most}) >= _MOMENTS
+    return several and convincing(fields, model, judge(fields, model, Term(alternative, tuple(most[-1].items()))))
+
+
+def _changing(run: ExaminedRun, searched: SearchResult) -> EffectSearch:
+    """The end of a search whose next finding is a change that most units have: each of them has a course over time.
+
+    Changes of single units, bad dwells, and effects of time or temperature are parts of that course and are withdrawn.
+    """
+    parts = [each.term for each in run.handled if each.term is not None and set(each.term.keywords) >= _CHANGE]
+    run.handled = [each for each in run.handled if each.term is None or each.term not in parts]
+    run.beside, run.removed = [term for term in run.beside if term not in parts], []
+    base, varied = run.model(), {"force", "time", "temperature"}
+    fields = Candidates(base.problem, candidates_of(base, run.effects), alternatives())
+    physics = [(t, t.effect) for t in searched.added if not isinstance(t.effect, Handling)]
+    added = tuple(t for t, effect in physics if drivers_of(run.lot.state, effect) & varied == {"force"})
+    time = next(driver for driver in looks_of(base.problem) if driver.name == "time_s")
+    curved = base.with_curves(time.candidate.of_blocks[:, :, 0, :])
+    log_p = searched.ladder[0].log_p + float(np.log(fields.looks))
+    run.drift, run.changing = Unexplained("time_s", "curve", log_p, floor=curved.floor(), model=curved), True
+    model = Model(base.problem, [*base.terms, *added], near=base.noise)
+    result = SearchResult(model, added, searched.ladder if added else ())
+    return EffectSearch(base, fields, part_of(fields, base, wide=False), result)
 
 
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:

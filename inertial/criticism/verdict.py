@@ -155,11 +155,11 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
     run, search = examined(_about_its_temperature(lot, effects), effects, barred)
     base, searched = search.base, search.result
     drivers = looks_of(base.problem)
-    log_p = adequacy(search.field, drivers, base, rng)
+    log_p = -np.inf if run.contradicted else adequacy(search.field, drivers, base, rng)
     removed = tuple(with_tails(searched.model, run.removed)) if run.removed else ()
     named_data = bool(run.handled) or any(not d.tail for d in removed)
     rms = rms_of(fitted_residuals(base))
-    unjudged = not_judged(base, rms)
+    unjudged = run.contradicted or not_judged(base, rms)
     passed = passes(np.exp(log_p), ADEQUATE_ABOVE) if rms <= GROSS else False
     if passed is None and not unjudged:
         unjudged = "the probability of the residuals is undefined; add poses in between"
@@ -189,12 +189,18 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
         unexplained=unexplained,
         removed=removed,
         rms=rms,
-        floor=final.floor() if unexplained is None else min(final.floor(), unexplained.floor),
+        floor=_samples(run) or (final.floor() if unexplained is None else min(final.floor(), unexplained.floor)),
         log_p=min(log_p, *_decided(searched, unexplained, search.field.looks)),
         sound=sound,
-        adequate=False if named_data else None if unjudged else sound,
+        adequate=False if named_data or run.contradicted else None if unjudged else sound,
         unjudged=unjudged,
     )
+
+
+def _samples(run: ExaminedRun) -> float:
+    """Noise of the recorded samples, g, where wrong poses leave no estimate from residuals; else zero."""
+    known = run.lot.error[np.isfinite(run.lot.error)]
+    return rms_of(known) if run.contradicted and run.lot.recorded else 0.0
 
 
 def _about_its_temperature(lot: Lot, effects: Sequence[str]) -> Lot:

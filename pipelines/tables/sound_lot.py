@@ -8,6 +8,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from inertial.counts import number_of
+from inertial.criticism.contradicted_poses import contradiction
 from inertial.criticism.few_dwells import REASON, contradicted
 from inertial.data_errors.faults import Fault, find_faults, missing_dwells, names_of_missing
 from inertial.decisions import ADEQUATE_ABOVE
@@ -53,11 +54,13 @@ def sound_lot(
     faults = [fault.named(measurement.units, numbers) for fault in unmeant]
     blocked = {f.unit for f in faults}
     sound = [u for u in range(len(measurement.units)) if u not in blocked]
-    if not sound:
-        return measurement, faults, None
     try:
         # two threads on small matrices wait for each other: on a busy machine it takes sixty times as long
         with threadpool_limits(1):
+            if not sound and not contradiction(lot_of(measurement))[0]:
+                return measurement, faults, None
+            if not sound:  # responses to wrong poses say nothing about the units
+                faults, blocked = [], set[int]()
             picked = measurement.pick(sound) if blocked else measurement
             return measurement, faults, lot_of(picked, square="misalignment" not in effects)
     except InertialError as problem:

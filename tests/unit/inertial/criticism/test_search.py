@@ -1,13 +1,17 @@
 """The forward search: effects that explain more together than jumps of single axes do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from each import each
+from made_worlds import BASE, World, lot_in, make
 
 from benchmarks.large_lots import MODEL, many_units
 from inertial.criticism.diagnosis import diagnose
 from inertial.estimation.lot import Lot
 from inertial.state import State
+from pipelines.diagnosis.diagnose import diagnose as diagnosed
 
 
 def temperature_test(bias: str, along: tuple[float, ...] = (1.0, -1.0, 0.0)) -> Lot:
@@ -20,21 +24,14 @@ def temperature_test(bias: str, along: tuple[float, ...] = (1.0, -1.0, 0.0)) -> 
     force = np.zeros((n, 3))
     force[:, 0] = np.resize(along, n)
     force[:, 2] = np.sqrt(1.0 - force[:, 0] ** 2)
-    line, square, gain = (
-        4e-5 * rng.normal(size=(4, 1)),
-        4e-7 * rng.normal(1.0, 0.2, (4, 1)),
-        3e-5 * rng.normal(size=(4, 1)),
-    )
+    each = (4, 1)
+    line, square, gain = 4e-5 * rng.normal(size=each), 4e-7 * rng.normal(1.0, 0.2, each), 3e-5 * rng.normal(size=each)
     levels = np.repeat(2e-3 * rng.normal(size=(4, 7)), 6, axis=1)
     slow = levels if bias == "jumps" else line * warm + square * warm**2
     output = slow + (1.0 + gain * warm) * force[:, 0] + 1e-4 * rng.normal(size=(4, n))
     time = 60.0 * np.arange(n) + 1800.0 * np.repeat(np.arange(7), 6)
-    state = State(
-        np.tile(force, (4, 1, 1)),
-        np.tile(time, (4, 1)),
-        np.tile(warm + 25.0, (4, 1)) + 0.1 * rng.normal(size=(4, n)),
-        axes=(0,),
-    )
+    read = np.tile(warm + 25.0, (4, 1)) + 0.1 * rng.normal(size=(4, n))
+    state = State(np.tile(force, (4, 1, 1)), np.tile(time, (4, 1)), read, axes=(0,))
     return Lot(state, output[..., None], np.full((4, n, 1), 1e-4), np.tile(np.eye(3), (4, 1, 1)))
 
 
@@ -75,3 +72,25 @@ def test_an_effect_that_many_units_have_alike_is_named_though_each_of_them_hardl
 def test_noise_and_poses_that_differ_alike_for_all_of_many_units_are_no_effect(common: str) -> None:
     found = diagnose(many_units(80, 43, common, 1.5), MODEL, np.random.default_rng(2))
     assert (found.adequate, found.named, found.handled) == (True, (), ())
+
+
+@each(["", "radians", "one row too late", "order of rows"])
+def test_poses_that_contradict_the_outputs_are_told_and_nothing_else(wrong: str) -> None:
+    dwells = make(World(units=3), 5).dwells.drop(columns=["force_x", "force_y", "force_z"], errors="ignore")
+    angles, order = ["outer_deg", "inner_deg"], np.random.default_rng(1).permutation(72)
+    for _, rows in dwells.groupby("unit"):
+        table = rows[angles].to_numpy()
+        other = {"radians": np.radians(table), "one row too late": np.roll(table, 1, 0), "order of rows": table[order]}
+        dwells.loc[rows.index, angles] = other.get(wrong, table)
+    found = diagnosed(dwells)
+    assert (found["adequate"], found["classes"], found["unexplained"]) == (not wrong, [], None)
+    assert wrong in (found["reason"] or "")
+
+
+def test_a_saw_tooth_of_every_unit_is_a_course_over_time_and_no_change_of_single_units() -> None:
+    lot, phase = lot_in(make(World(), 7)), np.linspace(0.0, 0.9, 8)[:, None, None]
+    saw = 4e-4 * ((lot.state.time[..., None] / 2500.0 + phase) % 1.0 - 0.5)
+    found = diagnose(replace(lot, output=lot.output + saw), BASE, np.random.default_rng(2))
+    assert (found.adequate, found.handled, found.named, found.removed) == (False, (), (), ())
+    assert found.unexplained is not None
+    assert found.unexplained.driver == "time_s"
