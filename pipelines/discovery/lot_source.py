@@ -187,7 +187,7 @@ class DiscoveryArchive:
             size[:, at] += product.lots * product.size.reshape(AXES, -1)
             weight[at] += product.lots
         size /= np.maximum(weight, 1.0)
-        return Pool(Products(columns, station, lot.reshape(AXES * k, -1), inside, size.reshape(-1)))
+        return Pool(Products(columns, station, lot.reshape(AXES * k, AXES * k), inside, size.reshape(-1)))
 
     def _drivers(self, run: ScoredRun) -> tuple[dict[str, tuple[str, ...]], dict[str, Array]]:
         levels: dict[str, tuple[str, ...]] = {SLOT: run.slots} if any(run.slots) else {}
