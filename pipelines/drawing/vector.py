@@ -5,6 +5,7 @@ Written directly: a report has dozens of plots, and a drawing library takes a hu
 
 from dataclasses import dataclass, replace
 from html import escape
+from itertools import pairwise
 
 import numpy as np
 
@@ -146,10 +147,12 @@ def _left(chart: Chart, number: int, scaled: _Scaled) -> float:
 
 def _foot(ticks: Ticks, wide: float) -> float:
     """Room that names need below level ones where they are turned because they would not stand side by side; else 0."""
-    texts = [text for _, text in ticks]
-    if sum(len(text) + 2 for text in texts) * LETTER <= wide:
+    lengths = [len(text) for _, text in ticks]
+    # one long name is as wide as its neighbours leave it room
+    widest = max((0.5 * (first + second) for first, second in pairwise(lengths)), default=0.0)
+    if (widest + 2.0) * len(lengths) * LETTER <= wide:
         return 0.0
-    return SINE * LETTER * min(max(map(len, texts)), LONGEST_TURNED) - 4.0
+    return SINE * LETTER * min(max(lengths), LONGEST_TURNED) - 4.0
 
 
 def _axes(plot: Plot, area: PlotArea, scaled: tuple[_Scaled, _Scaled], foot: float, *, labelled: bool) -> str:

@@ -140,6 +140,13 @@ def test_on_narrow_screens_plots_stand_one_under_the_other_lines_are_divided_nam
     assert "narrow" not in plotly_figure(Chart("", (replace(plot, x=PlotAxis("time / s")),)))
 
 
+def test_names_are_turned_where_one_of_them_is_wider_than_its_place() -> None:
+    for longest, turned in (("season", False), ("own temperature coefficient", True)):
+        names = ("mean", "station", "date", longest, "slot", "unit", "wafer", "operator", "supplier")
+        plot = Plot("", PlotAxis("", names=names), PlotAxis("y"), (Trace("", np.arange(9.0), np.arange(9.0)),))
+        assert ("rotate(-38" in svg_text(Chart("", (plot,), height=200))) is turned
+
+
 def test_turned_names_are_whole_inside_the_picture() -> None:
     names = tuple(f"effect_{'x' * 9}{k:02d}" for k in range(20))
     text = svg_text(
