@@ -142,8 +142,20 @@ def test_on_narrow_screens_plots_stand_one_under_the_other_lines_are_divided_nam
 
 def test_names_are_turned_where_one_of_them_is_wider_than_its_place() -> None:
     for longest, turned in (("season", False), ("own temperature coefficient", True)):
-        names = ("mean", "station", "date", longest, "slot", "unit", "wafer", "operator", "supplier")
-        plot = Plot("", PlotAxis("", names=names), PlotAxis("y"), (Trace("", np.arange(9.0), np.arange(9.0)),))
+        names = (
+            "mean",
+            "station",
+            "date",
+            longest,
+            "slot",
+            "unit",
+            "wafer",
+            "operator",
+            "supplier",
+            "firmware",
+            "batch",
+        )
+        plot = Plot("", PlotAxis("", names=names), PlotAxis("y"), (Trace("", np.arange(11.0), np.arange(11.0)),))
         assert ("rotate(-38" in svg_text(Chart("", (plot,), height=200))) is turned
 
 
