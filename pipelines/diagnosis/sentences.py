@@ -142,10 +142,10 @@ def slow_noise(document: DiagnosisDocument) -> str:
     rows = hidden(document)
     if not document["adequate"] or not rows or floor is None or white is None or floor <= 2**0.5 * white:
         return ""
-    sizes = ", ".join(f"{row['effect']} ({short(row['size_ug'], 2)} µg)" for row in rows)
+    sizes = ", ".join(f"{row['effect']} below {short(row['size_ug'], 2)} µg" for row in rows)
     return (
-        f"white noise is {short(white)} µg, the rest counts as slow noise, which hides effects smaller than {sizes}; "
-        "a second run shows what comes again"
+        f"white noise is {short(white)} µg, the rest counts as slow noise, which hides {sizes}; "
+        "a second run shows what is repeated"
     )
 
 

@@ -44,7 +44,7 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
     named = [str(name) for name in table.columns if name != key]
     if taken := [name for name in named if name in (MEAN, DATE, STATION, SLOT, UNIT)]:
         raise WrongUse(
-            f"attributes: {source} has a column '{taken[0]}', which is judged as every run records it; rename or remove it"
+            f"attributes: {source} has a column '{taken[0]}', the name of a driver that every run has; rename or remove it"
         )
     refused = [name for name in named if name.lower() in NOT_DRIVERS]
     names = [name for name in named if name not in refused]

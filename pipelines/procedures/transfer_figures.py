@@ -230,9 +230,6 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
 TOO_GOOD_P = 1e-3
 """Probability of so small a χ² below which the stated uncertainties are told to be too large."""
 
-_IN_ORDER = 0.3
-"""Correlation of neighbouring residuals, two standard deviations for the points of a sweep, from which they have an order."""
-
 
 def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") -> list[tuple[str, str]]:
     """Subject and text of the figures of a model with U (k = 2), of its polarity, and of uncertainties too large or small.
@@ -269,8 +266,8 @@ def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") 
         out.append(("uncertainties", text))
     elif diagnosis.unexplained and not diagnosis.alone_hz:
         left = fit.residual.reshape(2, -1)[:, np.argsort(points.conditions.frequency)]  # magnitudes and phases
-        # of independent errors the steps from point to point have twice the squares of the errors
-        if np.sum(np.diff(left) ** 2) > 2.0 * (1.0 - _IN_ORDER) * np.sum(left**2):
+        # of independent errors the correlation of neighbours is below two of its standard deviations, 2/√n
+        if np.sum(np.diff(left) ** 2) > 2.0 * (1.0 - 2.0 / np.sqrt(left.size)) * np.sum(left**2):
             text = (
                 f"the points scatter by {share:.2g} times the stated uncertainties, in no order: these may be too small"
             )

@@ -109,7 +109,8 @@ def print_recording(document: ImproveDocument) -> None:
     for line in recording["lines"]:
         if line.startswith("CHECK") or (": bias" in line and not document["added"]):
             say(f"  {line}", style="yellow" if line.startswith("CHECK") else "")
-    for text in filter(None, (sentences.evidence_text(judged), sentences.undetected(judged))):
+    basis = sentences.evidence_text(judged), sentences.undetected(judged), sentences.slow_noise(judged)
+    for text in filter(None, basis):
         say(f"  {text}", style="dim")
     _missing(document)
     for text in sections.unseen(judged, brief=True).notes:

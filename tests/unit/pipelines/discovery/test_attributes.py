@@ -62,7 +62,7 @@ def test_a_value_of_a_run_holds_for_its_units_unless_they_have_their_own_and_wha
 REFUSED = {
     "lot,wafer A1,W1": "no column 'serial', one is needed",
     "serial A1": "no column beside serial",
-    "serial,station A1,S1": "a column 'station', which is judged as every run records it",
+    "serial,station A1,S1": "a column 'station', the name of a driver that every run has",
     "serial,grade A1,pass": "grade follow from the result",
     "serial,wafer ,W1": "a row without serial",
     "serial,wafer A1,W1 A1,W2": "two values of wafer for A1 (W1, W2)",
