@@ -224,26 +224,26 @@ def mended(run: ExaminedRun) -> EffectSearch:
         searched_for = [a for a in alternatives() if a.id not in run.barred]
         fields = Candidates(base.problem, candidates_of(base, run.effects), searched_for)
         part = part_of(fields, base, wide=run.drift is not None)
-        searched, of = search(part.field, part.base, part.imitates), part.field
-        if not searched.handling and part.field is not fields:
+        searched = search(part.field, part.base, part.imitates)
+        if part.field is not fields:
+            # what a sample takes for a handling error can be an effect in the complete lot
             part.base.problem.forget()
             part.base.forget()
             result = search(fields, base, part.imitates, start=searched.added)
-            searched, of = replace(result, ladder=searched.ladder) if searched.added else result, fields
-        if part.field is not fields:
+            searched = replace(result, ladder=searched.ladder) if searched.added else result
             base.forget()
         if not searched.handling or len(run.handled) >= _MENDED:
             if run.withdraw(part, searched.added):
                 continue
             return EffectSearch(base, fields, part, searched)
-        if _of_most_units(of, searched.model, searched.handling[0]):
+        if _of_most_units(fields, searched.model, searched.handling[0]):
             return _changing(run, searched)
         if run.was_found(searched.handling[0]) and run.withdraw(part, searched.handling):
             continue
         for term in searched.handling:
             others = [other for other in searched.handling if other is not term]
-            beside = Model(of.problem, [*searched.model.terms, *others], near=searched.model.noise)
-            _mend(run, of, replace(searched, model=beside if others else searched.model), term)
+            beside = Model(fields.problem, [*searched.model.terms, *others], near=searched.model.noise)
+            _mend(run, fields, replace(searched, model=beside if others else searched.model), term)
 
 
 def _of_most_units(fields: Candidates, model: Model, term: Term) -> bool:

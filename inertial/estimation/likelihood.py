@@ -101,7 +101,7 @@ def _ratio(model: Model, term: Term, locations: int, noises: Sequence[Noise], sh
         return _ratio(model, term, locations, [*noises, richer.noise_at(others)], shared)
 
     # φ with the term in the model: an effect common to all units must not count as shared noise
-    return again(shared_noise(richer) if shared is None else shared, shares)
+    return again(noise_together(richer) if shared is None else shared, shares)
 
 
 @dataclass(frozen=True)
@@ -170,6 +170,11 @@ def shared_noise(model: Model) -> float:
     It is estimated from the median of the squares, so that one wrong pose does not raise it.
     """
     return together(model.space, model.space.residual, (0.5,)) if several(model) else 1.0
+
+
+def noise_together(model: Model) -> float:
+    """φ by the largest of the quantiles, which also sees what units share in some poses only; 1 for a single unit."""
+    return together(model.space, model.space.residual) if several(model) else 1.0
 
 
 def several(model: Model) -> bool:
@@ -267,11 +272,8 @@ def known_together(space: Space) -> float:
 
 
 def scatter_beside(richer: Model, term: Term) -> float:
-    """Variance of what all units share in a model with a term, at least 1, that the common part of the term must exceed."""
-    if of_station(term):
-        return scatter_of_poses(richer)
-    alone = term.shared or not several(richer)
-    return 1.0 if alone else together(richer.space, richer.space.residual)
+    """Scatter of the poses that a term of the station must exceed beside it; 1 for any other term."""
+    return scatter_of_poses(richer) if of_station(term) else 1.0
 
 
 def common_fit(space: Space, candidate: Candidate, point: int) -> Array:
