@@ -70,12 +70,13 @@ def _against_draws(draws: NoiseDraws, looks: Callable[[], Iterable[Candidate]], 
     """Log share of noise draws with a p-value as small as ``worst`` in any test; drawing ends when the result is clear."""
     blocks, n = draws.model.problem.blocks, draws.model.problem.n
     batch = int(np.clip(_NUMBERS // (blocks * n), 5, _BATCH))
-    if blocks * n > LARGE:
+    large = blocks * n > LARGE
+    if large:
         draws.model.forget()  # the draws need the memory
     drawn, beyond = 0, 0
     while drawn < DRAWS and beyond < ENOUGH:
         # if the first batch is undecided, the next two usually decide: they run together, so that columns are made once
-        batches = 1 if not drawn else min(2, -(-(DRAWS - drawn) // batch))
+        batches = 1 if large or not drawn else min(2, -(-(DRAWS - drawn) // batch))
         for used, log_p in enumerate(draws.worst(looks(), batch, batches), 1):
             drawn, beyond = drawn + log_p.size, beyond + int(np.count_nonzero(log_p <= worst))
             if beyond >= ENOUGH:

@@ -79,7 +79,7 @@ def _with_curve(model: Model, driver: Driver, noise: Noise, *, held: bool = Fals
     """The common curve of a driver that is best at a noise, in a model whose noise is estimated again or, if ``held``, kept."""
     candidate = driver.candidate
     if candidate.shared:
-        fitted, rank, shape = model.with_shared_curves(candidate.of_blocks[:, :, 0, :]), 0, 0
+        fitted, rank, shape = model.with_shared_curves(candidate.at(0)), 0, 0
     else:
         columns, rank = _curve(model.at(noise), candidate, driver.ways)
         fitted, shape = model.with_curves(columns), rank - driver.ways * model.problem.blocks
@@ -90,7 +90,7 @@ def _with_curve(model: Model, driver: Driver, noise: Noise, *, held: bool = Fals
 
 def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
     """Columns (blocks, n, ways) of the common curve that reduces the residual most, and its number of coefficients."""
-    flat = candidate.of_blocks[:, :, 0, :]
+    flat = candidate.at(0)
     blocks, n = flat.shape[:2]
     white = space.whiten(flat)
     columns, white, free = (a.reshape(blocks, n, ways, -1) for a in (flat, white, space.project(white)))

@@ -122,7 +122,7 @@ def _beyond_pose(base: Model, drivers: Sequence[Driver], final: Model) -> Space:
     pose = next((driver for driver in drivers if driver.name == "pose"), None)
     if pose is None:
         return base.at(final.noise)
-    return base.with_curves(pose.candidate.of_blocks[:, :, 0, :]).at(final.noise)
+    return base.with_curves(pose.candidate.at(0)).at(final.noise)
 
 
 def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> CarriedEvidence:

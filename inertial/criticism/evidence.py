@@ -155,7 +155,7 @@ def _cubic(model: Model, field: Candidates) -> float | None:
         return None
     effect = catalogue.get("third_order")
     space, term = model.space, Term(effect)
-    columns = model.problem.candidate(effect, [dict(term.values)]).of_blocks[:, :, 0, :]
+    columns = model.problem.candidate(effect, [dict(term.values)]).at(0)
     after = space.project(space.whiten(columns))
     rank = int(space.gain(term.candidate(model.problem)).rank[0])
     left = space.dof - rank

@@ -272,7 +272,7 @@ def _changing(run: ExaminedRun, searched: SearchResult) -> EffectSearch:
     physics = [(t, t.effect) for t in searched.added if not isinstance(t.effect, Handling)]
     added = tuple(t for t, effect in physics if drivers_of(run.lot.state, effect) & varied == {"force"})
     time = next(driver for driver in looks_of(base.problem) if driver.name == "time_s")
-    curved = base.with_curves(time.candidate.of_blocks[:, :, 0, :])
+    curved = base.with_curves(time.candidate.at(0))
     log_p = searched.ladder[0].log_p + float(np.log(fields.looks))
     run.drift, run.changing = Unexplained("time_s", "curve", log_p, floor=curved.floor(), model=curved), True
     model = Model(base.problem, [*base.terms, *added], near=base.noise)

@@ -78,7 +78,7 @@ def jumps_in_place_of(field: Candidates, model: Model, *rivals: Rival) -> Jumps 
 
 def _drops(space: Space, candidate: Candidate) -> Array:
     """Reduction of each block's residual sum of squares by an effect, (blocks,), beside the shared terms."""
-    white = space.whiten(candidate.of_blocks[:, :, 0, :])
+    white = space.whiten(candidate.at(0))
     columns = space.project(white)
     before, size = (np.sqrt(np.einsum("bnp,bnp->bp", each, each)) for each in (white, columns))
     columns = columns * np.where(size > SEEN * before, 1.0 / np.where(size > 0.0, size, 1.0), 0.0)[:, None, :]

@@ -245,7 +245,7 @@ def _function_of(base: Model, term: Term, suspect: Driver) -> bool:
     """Whether a flexible curve of the driver, block by block, reproduces nine tenths of a term's columns."""
     columns = term.columns(base.problem)
     before = base.at(base.problem.covariance.white_noise())
-    local = np.concatenate([base.local, suspect.candidate.of_blocks[:, :, 0, :]], axis=-1)
+    local = np.concatenate([base.local, suspect.candidate.at(0)], axis=-1)
     after = type(before)(before.covariance, before.noise, base.problem.y, local, base.shared)
     left = [float(np.sum(s.project(s.whiten(columns)) ** 2)) for s in (before, after)]
     return left[1] < 0.1 * left[0]

@@ -245,7 +245,7 @@ def _with_curves(
         if by_curve is not None:
             return by_curve
     best = max(clear, key=lambda d: _worth(final, d))
-    columns = best.candidate.of_blocks[:, :, 0, :]
+    columns = best.candidate.at(0)
     curved = final.with_curves(columns)
     log_p = _driver_log_p(final, best) + float(np.log(len(drivers)))
     shape = "line" if columns.shape[-1] == 1 else "curve"
@@ -302,7 +302,7 @@ def _convincing(model: Model, driver: Driver, looks: int) -> bool:
 
 def _driver_log_p(model: Model, driver: Driver) -> float:
     """Log probability that noise shows as strong a dependence on a driver, with wander estimated together with it."""
-    richer = model.with_curves(driver.candidate.of_blocks[:, :, 0, :])
+    richer = model.with_curves(driver.candidate.at(0))
     space = model.at(richer.noise)
     gain = space.gain(driver.candidate)
     return log_p_value(space, float(gain.drop[0]) / shared_noise(richer), int(gain.rank[0]))

@@ -1,7 +1,7 @@
 """Columns of an effect as a candidate for a model, rows times them, and the rows that several blocks have in common."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,19 @@ class Candidate:
     def of_blocks(self) -> Array:
         """The columns of each block, (blocks, n, grid, p)."""
         return self.columns if self.rows is None else self.columns[self.rows]
+
+    def at(self, point: int) -> Array:
+        """The columns of each block at a point of the grid, (blocks, n, p)."""
+        columns = self.columns[:, :, point]
+        return columns if self.rows is None else columns[self.rows]
+
+    def pieces(self, most: int) -> Iterator["Candidate"]:
+        """The candidate in pieces of at most ``most`` columns, but at least one point of the grid."""
+        points, p = self.columns.shape[2:]
+        each = max(1, most // p)
+        for start in range(0, points, each):
+            key = None if self.key is None else (self.key, start, each)
+            yield self if each >= points else replace(self, columns=self.columns[:, :, start : start + each], key=key)
 
     @property
     def blocks(self) -> Places | None:

@@ -98,7 +98,8 @@ def _ratio(model: Model, term: Term, locations: int, noises: Sequence[Noise], sh
         if others in [noise.shares for noise in noises]:
             ratio = weighed(deviance, rank, nonlinear, locations, replace(common, noise=max(shared, scatter)))
             return replace(ratio, shared=shared, shares=shares, again=again)
-        return _ratio(model, term, locations, [*noises, richer.noise_at(others)], shared)
+        # made anew: the ratios of a contest would keep the columns of every rival in memory
+        return _ratio(model, term, locations, [*noises, model.with_term(term).noise_at(others)], shared)
 
     # φ with the term in the model: an effect common to all units must not count as shared noise
     return again(noise_together(richer) if shared is None else shared, shares)
@@ -279,7 +280,7 @@ def scatter_beside(richer: Model, term: Term) -> float:
 def common_fit(space: Space, candidate: Candidate, point: int) -> Array:
     """Whitened series (blocks, n) of a candidate at a point of its grid, with coefficients by axis that all units share."""
     axes = space.covariance.axes
-    columns = space.project(space.whiten(candidate.of_blocks[:, :, point, :]))
+    columns = space.project(space.whiten(candidate.at(point)))
     by_axis = columns.reshape(-1, axes, *columns.shape[1:]).transpose(1, 0, 2, 3).reshape(axes, -1, columns.shape[2])
     left = space.residual.reshape(-1, axes, columns.shape[1]).transpose(1, 0, 2).reshape(axes, -1, 1)
     unit = unit_columns(by_axis)[0]
