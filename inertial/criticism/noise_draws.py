@@ -86,7 +86,7 @@ class NoiseDraws:
         dof = {point: self._basis(point).dof for point in points.tolist()}
         worst, spaces = np.zeros(count), dict[int, Space]()
         # products of at most as many columns as dwells take no more memory than the draws
-        for look, candidate in enumerate(piece for look in looks for piece in look.pieces(self.model.problem.n)):
+        for look, candidate in enumerate(piece for test in looks for piece in test.pieces(self.model.problem.n)):
             along = times_rows(rows, candidate)
             for point, draws in zip(points.tolist(), groups, strict=True):
                 if (look, point) not in self._directions:
