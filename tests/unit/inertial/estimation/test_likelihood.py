@@ -1,5 +1,8 @@
 """What of a reduction of the deviance is common to all units: its part, its price, and the noise that divides it."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -124,3 +127,16 @@ def test_rivals_are_compared_at_equal_wander_where_few_soaks_leave_it_open() -> 
     assert rival.deviance + 5.0 < again.deviance < best.deviance + price(100.0, rival.rank - best.rank)
     for shares in (rival.shares, Shares(walk=100.0)):  # its own, and one that explains the lot worse
         assert rival.at(rival.shared, shares).score == pytest.approx(rival.score)
+
+
+def test_a_ratio_keeps_no_model_with_its_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A contest holds the ratios of all rivals: of 200 units their models took half a gigabyte."""
+    problem = Problem(many_units(6, 3, "cubic", 1.0))
+    model = Model(problem, terms_of(get_all(MODEL), problem))
+    made: list[weakref.ref[Model]] = []
+    with_term = Model.with_term
+    monkeypatch.setattr(Model, "with_term", lambda *given: made.append(weakref.ref(m := with_term(*given))) or m)
+    ratio = likelihood_ratio(model, Term(get_all(["third_order"])[0]))
+    again = ratio.at(2.0, Shares(walk=0.5))
+    gc.collect()
+    assert (len(made) > 2, again.score < ratio.score, [ref() for ref in made if ref()]) == (True, True, [])
