@@ -74,6 +74,13 @@ def shared_data() -> Path:
 
 
 @pytest.fixture
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of its own for what the machine keeps of its stations: leases, notes, histories."""
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+@pytest.fixture
 def rng() -> np.random.Generator:
     """A seeded generator."""
     return np.random.default_rng(20260101)

@@ -1,12 +1,14 @@
-"""The judgement of a lot, once in a process: tests ask for the same one as text, as a document and as a page, of many copies."""
+"""The judgement of a lot, once: tests ask for the same one as text, as a document and as a page, of many copies."""
 
 import pickle
 from collections import OrderedDict
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from hashlib import sha256
 from typing import Any
 
 import pytest
+from once import once
 
 from inertial import effects
 
@@ -16,14 +18,15 @@ KEPT = 3
 
 @contextmanager
 def judged_once() -> Generator[None]:
-    """Within it a verdict and a diagnosis are made once for the same dwells and the same model of the catalogue."""
+    """Within it a verdict is made once in a session, and a diagnosis once in a process, for the same dwells and model."""
     from pipelines.diagnosis import diagnose
     from pipelines.stages import judge
 
     diagnoses: OrderedDict[bytes, Any] = OrderedDict()
     proposals: dict[int, Any] = {}
-    verdicts: dict[bytes, Any] = {}
-    of_lot, of_run, next_of = diagnose.diagnose_lot, judge.verdict_on, diagnose.proposed
+    of_lot, next_of = diagnose.diagnose_lot, diagnose.proposed
+    # where two packages are within it a verdict would wait for itself
+    of_run = getattr(judge._judged, "plain", judge._judged)
 
     def diagnosis(lot: Any, model: Any, rng: Any) -> Any:
         if effects._extra:  # a formula or a class of the test decides
@@ -44,13 +47,14 @@ def judged_once() -> Generator[None]:
     def verdict(dwells: Any, history: Any, model: Any) -> Any:
         if effects._extra:
             return of_run(dwells, history, model)
-        key = pickle.dumps((dwells, history, list(model)))
-        return dict(_kept(verdicts, key, lambda: of_run(dwells, history, model)))
+        key = sha256(pickle.dumps((dwells, history, list(model)))).hexdigest()
+        return once(f"verdict-{key}", lambda _: of_run(dwells, history, model))
 
+    verdict.plain = of_run  # pyright: ignore[reportFunctionMemberAccess]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(diagnose, "diagnose_lot", diagnosis)
         patch.setattr(diagnose, "proposed", proposed)
-        patch.setattr(judge, "verdict_on", verdict)
+        patch.setattr(judge, "_judged", verdict)
         yield
 
 

@@ -1,6 +1,7 @@
 """A run whose samples are those of the simulated station's own units, made in a second, to be written into these units."""
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from capture_double import BRIEF, CaptureDouble, small_job
+from once import once
 from pydantic import TypeAdapter
 
 from pipelines.archive import Archive, Run
@@ -52,6 +54,17 @@ def lot_run(folder: Path) -> Run:
     list(runner.all())
     keep_state(runner.run, job, lambda _plant: None)
     return runner.run
+
+
+def copied_lot(folder: Path) -> Run:
+    """A copy in a folder of such a run, which is made once in a session."""
+
+    def made(place: Path) -> Path:
+        lot_run(place)
+        return place
+
+    shutil.copytree(once("programmed-lot", made), folder)
+    return Archive(folder / "archive").run("latest")
 
 
 def keep_state(run: Run, job: Job, prepare: Callable[[Plant], None]) -> None:

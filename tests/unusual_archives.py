@@ -1,6 +1,7 @@
 """An archive with 500 units in a run, broken runs, and scripts in every name."""
 
 from pathlib import Path
+from urllib.parse import urlencode
 
 from benchmarks.generated_archive import write_archive
 from benchmarks.workbench import tables, write
@@ -10,6 +11,17 @@ SCRIPT = "<img src=x onerror=window.ran=1>"
 MARKUP = '"><script>window.ran=1</script>'
 LONG = "S" * 64
 MANY = [f"MANY{k:04d}" for k in range(500)]
+
+
+def addresses(run: str) -> list[str]:
+    """Pages of a workbench with a script in every part of their address, and of the run in which every name is one."""
+    return [
+        "/units?" + urlencode({"search": MARKUP, "station": SCRIPT}), f"/run?run={run}", f"/unit?run={run}",
+        "/unit?" + urlencode({"run": run, "unit": SCRIPT, "against": "pose"}), f"/unit?run={run}&unit={LONG}",
+        f"/missing?source={run}", f"/station?run={run}", "/audit?" + urlencode({"device": MARKUP}),
+        "/plan?" + urlencode({"recipe": SCRIPT, "pose": MARKUP}), "/models?" + urlencode({"model": MARKUP}),
+        "/upload?" + urlencode({"file": SCRIPT}),
+    ]  # fmt: skip
 
 
 def unusual_archive(root: Path) -> None:

@@ -138,6 +138,7 @@ def test_objects_draw_themselves_and_export_and_an_archive_is_tables(turned: pd.
         tl.archive(tmp_path / "nothing")
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_what_is_open_is_refused_with_what_to_state(lot: tl.Example, tmp_path: Path) -> None:
     table = pd.DataFrame(np.random.default_rng(1).normal(size=(50, 2)), columns=["p", "q"])
     with pytest.raises(tl.WrongUse, match="columns="):
@@ -145,7 +146,7 @@ def test_what_is_open_is_refused_with_what_to_state(lot: tl.Example, tmp_path: P
     with pytest.raises(tl.TumblelineError, match=r"absent\.csv"):
         tl.read(tmp_path / "absent.csv")
     with pytest.raises(tl.DataRejected, match="every unit is needed in both"):
-        tl.improve(lot.run, lot.model, fresh=lot.fresh.dwells.query("unit != 'DEMO-1'"))
+        tl.improve(lot.run, [*lot.model, "third_order"], fresh=lot.fresh.dwells.query("unit != 'DEMO-1'"))
     for wrong in (table.to_numpy(), table["p"], {"p": [1.0]}, None, 5, b"p", []):
         with pytest.raises(tl.WrongUse, match=rf"read: found {type(wrong).__name__}, .* DataFrame"):
             tl.read(wrong)

@@ -18,11 +18,7 @@ from stations.opening import open_station
 from stations.safety.folder import read_log as machine_log
 from stations.self_test import Standard, control_limits, keep, read_history
 
-
-@pytest.fixture(autouse=True)
-def state(tmp_path, monkeypatch):
-    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
-    return tmp_path / "state"
+pytestmark = pytest.mark.usefixtures("state")
 
 
 def status_of(*words: object, status: int = 0) -> dict:

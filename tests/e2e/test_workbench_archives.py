@@ -8,7 +8,7 @@ from urllib.parse import urlencode
 
 import pytest
 from browser import Served, Tab, served, tab, until
-from unusual_archives import LONG, MARKUP, SCRIPT, unusual_archive
+from unusual_archives import SCRIPT, addresses, unusual_archive
 
 # without a browser, with broken runs and 500 units: tests/unit/pipelines/workbench/test_unusual_archives.py
 pytestmark = pytest.mark.slow
@@ -85,14 +85,7 @@ def test_every_table_of_the_audit_is_there_as_numbers(bench: Served, browser: An
 
 
 def test_no_script_in_any_name_runs(bench: Served, browser: Any) -> None:
-    run = run_of(bench, "named-")
-    pages = [
-        "/units?" + urlencode({"search": MARKUP, "station": SCRIPT}), f"/run?run={run}", f"/unit?run={run}",
-        "/unit?" + urlencode({"run": run, "unit": SCRIPT, "against": "pose"}), f"/unit?run={run}&unit={LONG}",
-        f"/missing?source={run}", f"/station?run={run}", "/audit?" + urlencode({"device": MARKUP}),
-        "/plan?" + urlencode({"recipe": SCRIPT, "pose": MARKUP}), "/models?" + urlencode({"model": MARKUP}),
-        "/upload?" + urlencode({"file": SCRIPT}), "/operator?" + urlencode({"station": ""}), "/" + SCRIPT,
-    ]  # fmt: skip
+    pages = [*addresses(run_of(bench, "named-")), "/operator?" + urlencode({"station": ""}), "/" + SCRIPT]
     with tab(browser, bench.address) as one:
         for path in pages:
             one.page.goto(bench.address + path)

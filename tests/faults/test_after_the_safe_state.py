@@ -22,6 +22,8 @@ from schemas.safety import SAFE_WITHIN_S
 from stations.opening import open_station
 from stations.safety import folder, watchdog_client
 
+pytestmark = pytest.mark.usefixtures("state")
+
 QUICK_MOVES = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
 
 MOVER = """
@@ -42,12 +44,6 @@ for _ in range(int(sys.argv[3])):
     except TumblelineError as problem:
         print(json.dumps([type(problem).__name__, str(problem)]), flush=True)
 """
-
-
-@pytest.fixture(autouse=True)
-def state(tmp_path, monkeypatch):
-    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
-    return tmp_path / "state"
 
 
 @contextmanager

@@ -7,20 +7,15 @@ import sys
 from pathlib import Path
 
 import pytest
-from packed_archive import certified_archive, copied, later, logical, packed_zips, single
+from packed_archive import certified_archive, later, logical, packed_zips, single
 
 from pipelines.archive import Archive, packs
 from pipelines.archive.compaction import compact
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return Path(str(certified_archive(tmp_path_factory.mktemp("made")).root))
-
-
 @pytest.fixture
-def archive(made: Path, tmp_path: Path) -> Archive:
-    return copied(made, tmp_path / "archive")
+def archive(tmp_path: Path) -> Archive:
+    return certified_archive(tmp_path / "archive")
 
 
 READING = """
@@ -82,12 +77,12 @@ compaction.compact(Archive(sys.argv[1]))
 
 
 @pytest.mark.slow
-def test_killed_at_any_step_leaves_every_file(made: Path, tmp_path: Path) -> None:
-    expected = logical(Archive(str(made)))
+def test_killed_at_any_step_leaves_every_file(archive: Archive, tmp_path: Path) -> None:
+    expected = logical(archive)
     killed = 0
     for step in (1, 5, 7, 20, 150):  # before a zip, before its contents, between the packs, among the removals
         root = tmp_path / f"archive-{step}"
-        shutil.copytree(made, root)
+        shutil.copytree(str(archive.root), root)
         ended = subprocess.run([sys.executable, "-c", KILLED, str(root), str(step), "opens"], check=False)
         killed += ended.returncode == -signal.SIGKILL
         assert logical(Archive(str(root))) == expected

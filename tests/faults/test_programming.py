@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-import shutil
 import signal
 import struct
 import subprocess
@@ -15,7 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from capture_double import small_job, small_run
-from programmed_lot import LOT, keep_state, lot_run, plant_of, programmed
+from programmed_lot import LOT, copied_lot, keep_state, plant_of, programmed
 from root_process import ROOT
 from typer.testing import CliRunner
 
@@ -44,20 +43,10 @@ from stations.safety.suspenders import EmergencyStop
 COMMAND = next(r for r in load_profile("tumbleline_slot").registers if r.name == "memory_command").address
 
 
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("measured")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(VARIABLE, "")
-        lot_run(folder)
-    return folder
-
-
 @pytest.fixture
-def run(measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     monkeypatch.setenv(VARIABLE, "")
-    shutil.copytree(measured, tmp_path / "copy")
-    return Archive(tmp_path / "copy" / "archive").run("latest")
+    return copied_lot(tmp_path / "copy")
 
 
 def job_of(run: Run) -> Job:

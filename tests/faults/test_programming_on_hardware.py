@@ -1,7 +1,6 @@
 """The writing of devices through real sockets, with lease and watchdog; and a process that is killed in the middle."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -9,11 +8,10 @@ from pathlib import Path
 
 import pytest
 from driven_station import told
-from programmed_lot import lot_run
+from programmed_lot import copied_lot
 from root_process import ROOT
 from served_station import modbus_station, served_plant, station_file
 
-from pipelines.archive import Archive, Run
 from pipelines.archive.signatures import VARIABLE
 from pipelines.certificates import Ledger
 from pipelines.certificates.days import today
@@ -42,23 +40,12 @@ assert [one.outcome for one in done] == ["proved"], [one.reason for one in done]
 """
 
 
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("measured")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(VARIABLE, "")
-        lot_run(folder)
-    return folder
-
-
 @pytest.mark.slow
 def test_killed_while_it_writes_the_watchdog_makes_the_station_safe_and_the_next_writing_proves(
-    measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: Path
 ) -> None:
     monkeypatch.setenv(VARIABLE, "")
-    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
-    shutil.copytree(measured, tmp_path / "copy")
-    run: Run = Archive(tmp_path / "copy" / "archive").run("latest")
+    run = copied_lot(tmp_path / "copy")
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     with served_plant(lot=Lot.model_validate(run.about["lot"])) as (port, plant):

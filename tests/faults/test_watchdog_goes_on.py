@@ -24,11 +24,7 @@ from stations.plant.faults.proxy import ChaosProxy, WireAction
 from stations.safety import folder, lease_files, leases, watchdog_client
 from stations.safety.leases import Leases, holders, new_holder
 
-
-@pytest.fixture(autouse=True)
-def state(tmp_path, monkeypatch):
-    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
-    return tmp_path / "state"
+pytestmark = pytest.mark.usefixtures("state")
 
 
 def killed(process):

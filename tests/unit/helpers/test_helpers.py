@@ -5,9 +5,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 from each import each
+from judged_once import judged_once
 from orchestrator import BUSY, errors_in
+
+from pipelines.stages import judge
 
 
 def test_every_value_is_tried_and_all_that_are_wrong_are_named() -> None:
@@ -45,6 +50,16 @@ def test_every_value_has_a_folder_and_patches_of_its_own(value: str, tmp_path, m
     assert "TUMBLELINE_EACH" not in os.environ
     (tmp_path / value).touch()
     monkeypatch.setenv("TUMBLELINE_EACH", value)
+
+
+def test_a_run_is_judged_once_for_the_same_dwells_and_model_also_within_two_packages(monkeypatch) -> None:
+    asked = []
+    monkeypatch.setattr(judge, "_judged", lambda *given: (asked.append(given), (judge._not_judged("a test"), None))[1])
+    dwells = pd.DataFrame({"out_x": np.random.default_rng(20261130).normal(size=3)})
+    with judged_once(), judged_once():
+        tables = [judge.judge(dwells.copy(), None, model)["verdict"] for model in (["bias"], ["bias"], ["scale"])]
+    assert [table["reason"].item() for table in tables] == ["a test"] * 3
+    assert [model for *_, model in asked] == [["bias"], ["scale"]]
 
 
 STARTED = "02:26:50.483 | WARNING | prefect.server - slow\n"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from capture_double import small_run
-from packed_archive import certified_archive, copied, later, logical, packed_zips, single
+from packed_archive import certified_archive, later, logical, packed_zips, single
 
 from pipelines.archive import Archive, files, packs
 from pipelines.archive.backup import copy_archive
@@ -21,14 +21,9 @@ from pipelines.integrity.archive import verify
 from schemas.errors import ArchiveUnusable, OperatorNeeded
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return Path(str(certified_archive(tmp_path_factory.mktemp("made")).root))
-
-
 @pytest.fixture
-def archive(made: Path, tmp_path: Path) -> Archive:
-    return copied(made, tmp_path / "archive")
+def archive(tmp_path: Path) -> Archive:
+    return certified_archive(tmp_path / "archive")
 
 
 def test_every_reader_sees_the_same_files(archive: Archive) -> None:

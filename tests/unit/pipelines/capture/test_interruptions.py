@@ -12,6 +12,7 @@ from pipelines.cli.summary import summary
 from pipelines.report import render
 from schemas.event import Event
 
+pytestmark = pytest.mark.usefixtures("no_verdict")
 DOOR = "the chamber's door is open, closed is needed"
 BACK = "thrown away; back to the last checkpoint"
 

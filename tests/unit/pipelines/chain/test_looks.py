@@ -12,6 +12,7 @@ from once import once
 
 from inertial.fits.known import noise_guard
 from pipelines.archive import Archive, Run
+from pipelines.chain.chain import ORDER
 from pipelines.chain.looks import LotLooks
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job, Request
@@ -52,18 +53,7 @@ def job_of(folder: Path, bias: float) -> Job:
 
 def made(folder: Path) -> tuple[Path, str]:
     runner = Runner(job_of(folder, 800.0), Archive(folder / "archive"))
-    for stage in (
-        "capture",
-        "validate",
-        "reduce",
-        "fit",
-        "judge",
-        "verify",
-        "noise",
-        "soak_noise",
-        "procedures",
-        "budget",
-    ):
+    for stage in ORDER[: ORDER.index("budget") + 1]:
         runner.stage(stage)
     return folder / "archive", runner.run.id
 

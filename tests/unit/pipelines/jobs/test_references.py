@@ -24,6 +24,7 @@ from pipelines.report.panels import stated_references
 from schemas.errors import WrongUse
 from stations.plant.preset import load_preset
 
+pytestmark = pytest.mark.usefixtures("no_verdict")
 WORKSHOP = ROOT / "deploy" / "stations" / "simulated-workshop.toml"
 Array = np.ndarray
 

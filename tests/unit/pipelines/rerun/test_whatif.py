@@ -25,6 +25,7 @@ from pipelines.rerun.whatif import fresh_tasks, summary
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import RecipeInvalid, WrongUse
 
+pytestmark = pytest.mark.usefixtures("no_verdict")
 FULL = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
 POOR = 'effects = ["bias", "scale", "misalignment", "bias_temperature"]'
 LIGHT = ('poses = "nine"', 'poses = "six"'), ("static_record_s = 30.0", "static_record_s = 0.0")

@@ -2,11 +2,10 @@
 
 import re
 from pathlib import Path
-from urllib.parse import urlencode
 
 import pytest
 from asgi_client import AsgiClient
-from unusual_archives import LONG, MANY, MARKUP, SCRIPT, unusual_archive
+from unusual_archives import MANY, addresses, unusual_archive
 
 from pipelines.workbench.application import create_app
 from pipelines.workbench.settings import WorkbenchSettings
@@ -54,14 +53,7 @@ def test_a_broken_run_is_said_in_a_sentence_and_the_others_are_shown(client: Asg
 
 def test_a_script_in_a_name_is_text(top: Path, client: AsgiClient) -> None:
     run = next(path.name for path in top.glob("archive/runs/named-*"))
-    addresses = [
-        "/units?" + urlencode({"search": MARKUP, "station": SCRIPT}), f"/run?run={run}", f"/unit?run={run}",
-        "/unit?" + urlencode({"run": run, "unit": SCRIPT, "against": "pose"}), f"/unit?run={run}&unit={LONG}",
-        f"/missing?source={run}", f"/station?run={run}", "/audit?" + urlencode({"device": MARKUP}),
-        "/plan?" + urlencode({"recipe": SCRIPT, "pose": MARKUP}), "/models?" + urlencode({"model": MARKUP}),
-        "/upload?" + urlencode({"file": SCRIPT}), "/units",
-    ]  # fmt: skip
-    for address in addresses:
+    for address in (*addresses(run), "/units"):
         text = page(client, address)
         assert "<img src=x" not in text, address
         assert "<script>window" not in text, address
