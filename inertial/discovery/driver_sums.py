@@ -16,13 +16,16 @@ class DriverSums(Levels):
 
     units : number of units of each level · about : origin from which a number is counted
     inside, between : information from differences within lots, and from the means of lots
+    spread : rms of the numbers over the units, about the origin; 1 for labels
     """
 
     def __init__(self, driver: str, lots: Sequence[ScoredLot]) -> None:
         super().__init__(lots[0].information.size)
         self.driver, self.units, self.inside, self.between = driver, Counter[str](), 0.0, 0.0
         means = [float(numbers.mean()) for lot in lots if (numbers := lot.number(driver)) is not None]
-        self.about = float(np.nanmean(means)) if means else 0.0
+        self.about, self.spread = float(np.nanmean(means)) if means else 0.0, 1.0
+        self._squares = np.zeros(2)  # of the numbers about the origin: their number and sum
+        self._overlap = Levels(lots[0].information.size)
 
     @property
     def labels(self) -> list[str]:
@@ -76,12 +79,14 @@ class DriverSums(Levels):
         if self.driver in {MEAN, STATION}:
             self._add_level(labels[0], sums / between, info / between, len(labels))
         elif numbers is None:
-            for label in dict.fromkeys(labels):
+            among = dict.fromkeys(labels)
+            for label in among:
                 here = np.array([other == label for other in labels])
                 of_level = by_unit[here].sum(axis=0)
                 share = of_level / total
                 score, information = left[here].sum(axis=0) / within, of_level * (1.0 - share) / within
                 self.inside += float(information.sum())
+                self._overlap.add((label,), score[None], ((len(among) - 1) * of_level * share / within)[None])
                 if not self.inside_only:  # add the information of the lot's mean
                     common = share**2 * info / between
                     score, information = score + share * sums / between, information + common
@@ -94,7 +99,19 @@ class DriverSums(Levels):
             score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - info * mean) / between
             inside, common = (about**2 * by_unit).sum(axis=0) / within, centre**2 * info / between
             self.inside, self.between = self.inside + float(inside.sum()), self.between + float(common.sum())
+            self._squares += len(numbers), float((from_origin**2).sum())
             self._add_level(SLOPE, score, inside + common, len(lot.units))
+
+    def complete(self) -> None:
+        """Conclude the sums after the last lot.
+
+        Differences within lots are about the mean of the lot. Where a lot of n of all g levels is about the mean of them all, a
+        share p of it loses the information p²·(1 − (n − 1)/(g − 1)), which is nothing if all levels are in each lot.
+        """
+        for label, at in self.place.items() if len(self.place) > 1 else ():
+            self._sums[1, at] += self._overlap.of(label)[1] / (len(self.place) - 1)
+        count, squares = self._squares
+        self.spread = float(np.sqrt(squares / count)) if squares > 0.0 else 1.0
 
     def _add_level(self, label: str, score: Array, information: Array, units: int) -> None:
         """Add scores and information (h,) of some units to a level."""
@@ -117,6 +134,8 @@ def gathered(
     for lot in lots:
         for sums in out.values():
             sums.gather(lot, means[lot.station], noise, seen)
+    for sums in out.values():
+        sums.complete()
     return {name: sums for name, sums in out.items() if sums.labels}
 
 

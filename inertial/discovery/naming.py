@@ -371,12 +371,24 @@ class Pool:
         effects = sorted((e for e in self.effects if scores[driver, e] > least and e != SHAPE), key=rank)
         drivers = [name for name, of in scores if of == effect and scores[name, of] > top - CLASS_WIDTH]
         drivers.sort(key=lambda other: (other != driver, -scores[other, effect]))
-        here = self.everywhere(effects[0]).reshape(self.axes, -1)[:, 0]
-        info = sums.information[:, here]
-        sizes = over(sums.centred[:, here], info) * self.size[here]
-        errors = np.where(info > 0.0, over(1.0, np.sqrt(np.maximum(info, 0.0))), np.inf) * self.size[here]
         weights = np.array(list(sums.units.values()), dtype=np.float64)
-        return Name(tuple(effects), tuple(drivers), tuple(sums.labels), weights, sizes, errors, top)
+        return Name(tuple(effects), tuple(drivers), tuple(sums.labels), weights, *self._sizes(sums, effects[0]), top)
+
+    def _sizes(self, sums: DriverSums, effect: str) -> tuple[Array, Array]:
+        """Rms over the dwells, g, of an effect with all its columns by level and axis, (levels, axes), and standard errors.
+
+        Of a number: rms over the units, too.
+
+        The sign is that of the column with the largest sum of squares; an error is infinite where no lot shows the axis.
+        """
+        at, coefficients, covariances = self.places(effect), *self._fitted(sums, effect)
+        size = sums.spread * self.size[self.everywhere(effect)].reshape(self.axes, 1, -1)
+        columns, covariances = coefficients * size, covariances * size[..., None] * size[..., None, :]
+        among = self.inside[:, at[:, None], at]
+        squares = np.einsum("agp,apq,agq->ga", columns, among, columns)
+        errors = np.sqrt(np.maximum(np.einsum("apq,agqp->ga", among, covariances), 0.0))
+        largest = columns[..., int(np.argmax(np.sum(columns**2, axis=(0, 1))))].T
+        return np.copysign(np.sqrt(np.maximum(squares, 0.0)), largest), np.where(errors > 0.0, errors, np.inf)
 
 
 def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float) -> set[int]:
