@@ -136,7 +136,12 @@ class DiscoveryArchive:
             if head["device"] == self.device and lots.get(lot, ("", "-"))[1]:
                 lots.pop(lot, None)  # a lot arrives with the run that it counts by
                 lots[lot] = run, head["left_out"]
-        yield from lots.values()
+        first = dict[int, str]()
+        for run, reason in lots.values():
+            prints = () if reason else self.store.heads[run]["prints"]
+            twin = next((first[known] for known in prints if known in first), "")
+            first |= {} if twin else dict.fromkeys(prints, run)
+            yield run, f"its dwells are those of {twin}, which counts" if twin else reason
 
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:

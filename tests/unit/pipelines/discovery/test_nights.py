@@ -15,7 +15,7 @@ from demonstrations import wafer_line
 
 from pipelines.archive import Archive, derived, files
 from pipelines.audit.calibrations import Calibrations
-from pipelines.demo.archive_lots import Line, write_lots
+from pipelines.demo.archive_lots import Line, write_lots, write_run
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.discoveries import Discoveries
@@ -73,6 +73,20 @@ def test_scores_on_disk_are_few_bytes_and_nearly_those_of_the_dwells(archive: Ar
     assert after.scores is not None
     assert after.scores.score == pytest.approx(before.scores.score, rel=1e-12)  # the same bytes from the same dwells
     assert after.units == before.units
+
+
+def test_the_same_dwells_in_another_run_count_once(tmp_path: Path) -> None:
+    """A file that is imported again from another format is another run; its noise would confirm itself."""
+    archive, line = Archive(str(tmp_path / "archive")), Line(5, units=2)
+    archive.prepare()
+    dwells, about = line.lot("line-1")
+    for number, taken in enumerate((dwells, dwells, dwells[dwells["unit"] == about["unit"][1]])):
+        write_run(archive, number, "line-1", taken, about[about["unit"].isin(taken["unit"])])
+    source = DiscoveryArchive(archive)
+    source.score(1)
+    first, *others = source.store.heads
+    assert source.pooled() == [first]
+    assert source.left_out() == [(run, f"its dwells are those of {first}, which counts") for run in others]
 
 
 def test_a_second_night_adds_an_entry_and_rewrites_none(archive: Archive) -> None:
