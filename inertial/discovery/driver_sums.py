@@ -44,8 +44,8 @@ class DriverSums(Levels):
 
     @property
     def centred(self) -> Array:
-        """Scores (g, h) of levels; for a driver judged within lots only, about the mean over all levels."""
-        if not self.inside_only or len(self.labels) < 2:
+        """Scores (g, h) of levels about the mean over all levels: what they have in common is of the driver "mean"."""
+        if len(self.place) < 2:
             return self.score
         return self.score - self.information * over(self.score.sum(axis=0), self.information.sum(axis=0))
 

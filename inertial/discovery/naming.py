@@ -128,12 +128,18 @@ class Pool:
         while True:
             sums, scores, significant = self._judged(lots, drivers, needed)
             of_pose.append({pair: score for pair, score in scores.items() if pair[1] == SHAPE})
+            if found:
+                # what the best of a class does not take away is another effect, with the same score by chance
+                most = needed + max(CLASS_WIDTH, _INEXACT * found[-1].score)
+                best, driver = found[-1].effects[0], found[-1].drivers[0]
+                same = tuple(e for e in found[-1].effects if e == best or scores.get((driver, e), 0.0) <= most)
+                found[-1] = replace(found[-1], effects=same)
             pairs = [
                 (scores[pair], *pair)
                 for pair in significant
                 if pair[1] != SHAPE
                 # a remainder of other names is named only if it had an alarm itself and a clearly higher score
-                and (not found or (pair in alarmed and scores[pair] > needed + CLASS_WIDTH))
+                and (pair in alarmed and scores[pair] > needed + CLASS_WIDTH if found else self._raised(pair, alarmed))
             ]
             new = (name for name in self._in_order(pairs, sums, scores) if not self._already_named(found, name))
             name = next(new, None)
@@ -216,14 +222,23 @@ class Pool:
             same = (n for score, n, other in pairs if other == effect and n != MEAN and score > top - CLASS_WIDTH)
             yield self._name(sums[next(same, best)], effect, scores)
 
+    def _raised(self, pair: tuple[str, str], alarmed: Iterable[tuple[str, str]]) -> bool:
+        """Whether an effect or one with similar columns, or any function of the pose, had an alarm by a driver."""
+        driver, effect = pair
+        return any(by == driver and (other == SHAPE or self._alike(effect, other)) for by, other in alarmed)
+
+    def _alike(self, effect: str, other: str) -> bool:
+        """Whether two effects are the same or have columns that are nearly proportional."""
+        cosines = self.lot[np.ix_(self.everywhere(effect), self.everywhere(other))]
+        return effect == other or bool(np.abs(cosines).max() > _ALIKE)
+
     def _already_named(self, found: Sequence[Name], new: Name) -> bool:
         """Whether a name repeats an earlier one, or is the remainder of one whose column is not exactly that of its effect."""
         effect, driver = new.effects[0], new.drivers[0]
         for name in found:
             inexact = effects_catalogue.get(name.effects[0]).nonlinear
             little = new.score < (_REMAINDER_OF_SHAPE if inexact else _REMAINDER) * name.score
-            cosines = self.lot[np.ix_(self.everywhere(effect), self.everywhere(name.effects[0]))]
-            alike = set(new.effects) & set(name.effects) or np.abs(cosines).max() > _ALIKE
+            alike = set(new.effects) & set(name.effects) or self._alike(effect, name.effects[0])
             if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):
                 return True
         return False
@@ -355,7 +370,7 @@ class Pool:
         info = sums.information[:, here]
         z = over(sums.centred[:, here], np.sqrt(np.maximum(info, 0.0)))
         drop, rank = float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
-        k = float(np.sum(rank) - (np.count_nonzero(rank) if sums.inside_only else 0))
+        k = float(np.sum(rank) - (np.count_nonzero(rank) if len(sums.place) > 1 else 0))
         return max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
 
     def _name(self, sums: DriverSums, effect: str, scores: Scores) -> Name:
