@@ -160,4 +160,4 @@ def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float
         warnings.simplefilter("ignore", RuntimeWarning)  # an effect that no lot shows is nan for all of them
         many = np.nanmedian(np.clip(np.array(between), 0.0, np.nanquantile(between, 0.99)), axis=0) / NORMAL_MEDIAN**2
         few = np.nanmedian(np.array(within), axis=0)
-    return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))
+        return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))

@@ -13,9 +13,10 @@ import pandas as pd
 import pytest
 from demonstrations import wafer_line
 
+from inertial.frames import to_fixture
 from pipelines.archive import Archive, derived, files
 from pipelines.audit.calibrations import Calibrations
-from pipelines.demo.archive_lots import Line, write_lots, write_run
+from pipelines.demo.archive_lots import STATIONS, Line, write_lots, write_run
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.discoveries import Discoveries
@@ -87,6 +88,22 @@ def test_the_same_dwells_in_another_run_count_once(tmp_path: Path) -> None:
     first, *others = source.store.heads
     assert source.pooled() == [first]
     assert source.left_out() == [(run, f"its dwells are those of {first}, which counts") for run in others]
+
+
+def test_the_size_of_an_error_of_a_station_is_what_the_models_of_its_lots_leave(tmp_path: Path) -> None:
+    archive, line = Archive(str(tmp_path / "archive")), Line(5, units=2)
+    archive.prepare()
+    for number in range(66):
+        dwells, about = line.lot(STATIONS[number % 3])
+        leaning = to_fixture((200e-6, 0.0, 0.0), *np.radians(dwells[["outer_deg", "inner_deg"]].to_numpy().T))
+        dwells[["out_x", "out_y", "out_z"]] += leaning * (number % 3 == 0)
+        write_run(archive, number, STATIONS[number % 3], dwells, about)
+    columns = np.column_stack([np.ones(len(dwells)), dwells[["force_x", "force_y", "force_z"]]])
+    left = 1e6 * (leaning - columns @ np.linalg.lstsq(columns, leaning, rcond=None)[0])
+    rows = discovered(archive, Look()).document["discoveries"]
+    (row,) = (row for row in rows if "level_error" in row["effects"] and row["driver"] == "station")
+    # about the mean of three stations, of which one leans
+    assert row["size_ug"] == pytest.approx(np.sqrt(np.mean(left**2) * 2.0 / 9.0), rel=0.15)
 
 
 def test_a_second_night_adds_an_entry_and_rewrites_none(archive: Archive) -> None:
