@@ -25,7 +25,7 @@ class DriverSums(Levels):
         means = [float(numbers.mean()) for lot in lots if (numbers := lot.number(driver)) is not None]
         self.about, self.spread = float(np.nanmean(means)) if means else 0.0, 1.0
         self._squares = np.zeros(2)  # of the numbers about the origin: their number and sum
-        self._overlap = Levels(lots[0].information.size)
+        self._within = Levels(lots[0].information.size)
 
     @property
     def labels(self) -> list[str]:
@@ -79,14 +79,13 @@ class DriverSums(Levels):
         if self.driver in {MEAN, STATION}:
             self._add_level(labels[0], sums / between, info / between, len(labels))
         elif numbers is None:
-            among = dict.fromkeys(labels)
-            for label in among:
+            for label in dict.fromkeys(labels):
                 here = np.array([other == label for other in labels])
                 of_level = by_unit[here].sum(axis=0)
                 share = of_level / total
                 score, information = left[here].sum(axis=0) / within, of_level * (1.0 - share) / within
                 self.inside += float(information.sum())
-                self._overlap.add((label,), score[None], ((len(among) - 1) * of_level * share / within)[None])
+                self._within.add((label,), score[None], information[None])
                 if not self.inside_only:  # add the information of the lot's mean
                     common = share**2 * info / between
                     score, information = score + share * sums / between, information + common
@@ -105,11 +104,13 @@ class DriverSums(Levels):
     def complete(self) -> None:
         """Conclude the sums after the last lot.
 
-        Differences within lots are about the mean of the lot. Where a lot of n of all g levels is about the mean of them all, a
-        share p of it loses the information p²·(1 − (n − 1)/(g − 1)), which is nothing if all levels are in each lot.
+        Within lots a level differs from the mean of the lot; about the mean of all levels, to which its share w of the units
+        contributes, that is 1 − w of what it differs.
         """
+        units = sum(self.units.values())
         for label, at in self.place.items() if len(self.place) > 1 else ():
-            self._sums[1, at] += self._overlap.of(label)[1] / (len(self.place) - 1)
+            share = self.units[label] / units
+            self._sums[1, at] += self._within.of(label)[1] * share / (1.0 - share)
         count, squares = self._squares
         self.spread = float(np.sqrt(squares / count)) if squares > 0.0 else 1.0
 

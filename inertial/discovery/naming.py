@@ -25,6 +25,11 @@ _MOST = 6
 
 _TURNS = 5  # iterations of a fit of columns and levels that share lots
 
+_RELAXED = 2.0 / 3.0
+"""Part of the fitted sizes of levels that an iteration subtracts. Where lots have levels in pairs, each shows half of the other
+with the opposite sign, and a full step would turn it round; of modes with 1 to 2 times the information it leaves a third at most.
+"""
+
 _INEXACT = 0.02
 """Relative uncertainty of a score: products of columns are means over lots, parameters are at the middle of their range."""
 
@@ -145,14 +150,15 @@ class Pool:
             name = next(new, None)
             if name is None or len(found) == _MOST:
                 break
-            found.append(name)
-            lots = self._subtracted(lots, name.drivers[0], name.effects[0])
+            lots, *fitted = self._subtracted(lots, name.drivers[0], name.effects[0])
+            sizes, errors = self._sizes(sums[name.drivers[0]], name.effects[0], *fitted)
+            found.append(replace(name, sizes=sizes, errors=errors))
         imitations = _imitations(found, of_pose, needed)
         genuine = [name for at, name in enumerate(found) if at not in imitations]
         if len(genuine) < len(found):
             lots = every
             for name in genuine:
-                lots = self._subtracted(lots, name.drivers[0], name.effects[0])
+                lots, *_ = self._subtracted(lots, name.drivers[0], name.effects[0])
         return genuine, self._unnamed(lots, genuine, drivers, needed)
 
     def _unnamed(
@@ -168,7 +174,7 @@ class Pool:
                 break
             out.append(self._shape(sums[best[0]], scores[best]))
             least = max(least, _REMAINDER * scores[best])
-            lots = self._subtracted(lots, *best)
+            lots, *_ = self._subtracted(lots, *best)
         return out
 
     def _judged(
@@ -243,19 +249,32 @@ class Pool:
                 return True
         return False
 
-    def _subtracted(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
-        """The lots with an effect of a driver subtracted, iterated because its columns and levels share lots."""
+    def _subtracted(
+        self, lots: Sequence[ScoredLot], driver: str, effect: str
+    ) -> tuple[Sequence[ScoredLot], Array, Array]:
+        """The lots with an effect of a driver subtracted, iterated because its columns and levels share lots.
+
+        Returns
+        -------
+        lots, sizes (axes, levels, p) of the columns as fitted together, and their covariances (axes, levels, p, p)
+        """
+        taken: Array | float = 0.0
+        fitted, covariance = np.zeros((2, self.axes, 0))
         for _ in range(_TURNS):
             sums = gathered(lots, [driver]).get(driver)
             if sums is None or self.score(sums, effect) < 1.0:
                 break
             sizes, covariance = self._fitted(sums, effect)
+            fitted = taken + sizes
             if len(sums.labels) > 1:  # sizes of levels are shrunk towards zero according to their noise
                 noise = np.maximum(np.diagonal(covariance, axis1=2, axis2=3), 0.0).sum(axis=1)
                 share = 1.0 - noise / np.maximum((sizes**2).sum(axis=1), 1e-300)
-                sizes = sizes * np.clip(share, 0.0, 1.0)[:, None]
+                sizes = _RELAXED * sizes * np.clip(share, 0.0, 1.0)[:, None]
+            taken = taken + sizes
             lots = [self.without(lot, sums, effect, sizes) for lot in lots]
-        return lots
+        if fitted.shape[1] > 1:
+            lots, *_ = self._subtracted(lots, MEAN, effect)  # the levels are about their mean
+        return lots, fitted, covariance
 
     def _crossed(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> Iterator[tuple[str, Array]]:
         """For each lot and driver, the product of the lot's scores and their prediction by the other half, (effects,)."""
@@ -387,16 +406,23 @@ class Pool:
         drivers = [name for name, of in scores if of == effect and scores[name, of] > top - CLASS_WIDTH]
         drivers.sort(key=lambda other: (other != driver, -scores[other, effect]))
         weights = np.array(list(sums.units.values()), dtype=np.float64)
-        return Name(tuple(effects), tuple(drivers), tuple(sums.labels), weights, *self._sizes(sums, effects[0]), top)
+        return Name(
+            tuple(effects),
+            tuple(drivers),
+            tuple(sums.labels),
+            weights,
+            *self._sizes(sums, effects[0], *self._fitted(sums, effects[0])),
+            top,
+        )
 
-    def _sizes(self, sums: DriverSums, effect: str) -> tuple[Array, Array]:
+    def _sizes(self, sums: DriverSums, effect: str, coefficients: Array, covariances: Array) -> tuple[Array, Array]:
         """Rms over the dwells, g, of an effect with all its columns by level and axis, (levels, axes), and standard errors.
 
         Of a number: rms over the units, too.
 
         The sign is that of the column with the largest sum of squares; an error is infinite where no lot shows the axis.
         """
-        at, coefficients, covariances = self.places(effect), *self._fitted(sums, effect)
+        at = self.places(effect)
         size = sums.spread * self.size[self.everywhere(effect)].reshape(self.axes, 1, -1)
         columns, covariances = coefficients * size, covariances * size[..., None] * size[..., None, :]
         among = self.inside[:, at[:, None], at]

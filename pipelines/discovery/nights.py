@@ -20,7 +20,7 @@ from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
 
-_VERSION = 2  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
+_VERSION = 3  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
 _GROWN = 1.05  # growth of the number of lots from which on the naming is repeated
 _NOTHING: dict[str, Any] = {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0, "alarms": None}
 
@@ -152,8 +152,9 @@ def _found(folder: Place) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(data)
     if found.get("version") == _VERSION:
         return found
-    rows = found["discoveries"]
-    return {**_NOTHING, "discoveries": rows, "ids": max((int(row["id"][1:]) for row in rows), default=0)}
+    rows = [*found["discoveries"], *found.get("unexplained", [])]
+    known = max((int(row["id"][1:]) for row in rows), default=0)
+    return {**_NOTHING, "ids": known, **found, "alarms": None}
 
 
 def remembered(
