@@ -5,7 +5,7 @@ D − k(1 + ln(D/k)), the price of coefficients with estimated variance. Effects
 is subtracted from all sums by the products of the columns, and the remainder is searched again, finally for any function of pose.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -146,8 +146,8 @@ class Pool:
                 # a remainder of other names is named only if it had an alarm itself and a clearly higher score
                 and (pair in alarmed and scores[pair] > needed + CLASS_WIDTH if found else self._raised(pair, alarmed))
             ]
-            new = (name for name in self._in_order(pairs, sums, scores) if not self._already_named(found, name))
-            name = next(new, None)
+            every_name = (self._name(sums[driver], effect, scores) for _, driver, effect in sorted(pairs, reverse=True))
+            name = next((name for name in every_name if not self._already_named(found, name)), None)
             if name is None or len(found) == _MOST:
                 break
             lots, *fitted = self._subtracted(lots, name.drivers[0], name.effects[0])
@@ -219,15 +219,6 @@ class Pool:
         covariances = np.stack([covariance[:, axis, :, axis] for axis in range(self.axes)])
         return np.moveaxis(sizes.reshape(len(root), self.axes, -1), 1, 0), covariances
 
-    def _in_order(
-        self, pairs: Sequence[tuple[float, str, str]], sums: Mapping[str, DriverSums], scores: Scores
-    ) -> Iterator[Name]:
-        """Pairs of score, driver and effect as names, the best first."""
-        for top, best, effect in sorted(pairs, reverse=True):
-            # an effect that differs by level has a nonzero mean, too: such a driver is preferred to the mean
-            same = (n for score, n, other in pairs if other == effect and n != MEAN and score > top - CLASS_WIDTH)
-            yield self._name(sums[next(same, best)], effect, scores)
-
     def _raised(self, pair: tuple[str, str], alarmed: Iterable[tuple[str, str]]) -> bool:
         """Whether an effect or one with similar columns, or any function of the pose, had an alarm by a driver."""
         driver, effect = pair
@@ -272,8 +263,8 @@ class Pool:
                 sizes = _RELAXED * sizes * np.clip(share, 0.0, 1.0)[:, None]
             taken = taken + sizes
             lots = [self.without(lot, sums, effect, sizes) for lot in lots]
-        if fitted.shape[1] > 1:
-            lots, *_ = self._subtracted(lots, MEAN, effect)  # the levels are about their mean
+        if driver != MEAN:
+            lots, *_ = self._subtracted(lots, MEAN, effect)  # sizes are about the mean of levels, or of numbers
         return lots, fitted, covariance
 
     def _crossed(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> Iterator[tuple[str, Array]]:
@@ -403,7 +394,9 @@ class Pool:
 
         least = top - max(CLASS_WIDTH, _INEXACT * top)
         effects = sorted((e for e in self.effects if scores[driver, e] > least and e != SHAPE), key=rank)
-        drivers = [name for name, of in scores if of == effect and scores[name, of] > top - CLASS_WIDTH]
+        # what all lots have in common is another statement than what differs
+        alike = [name for name, of in scores if of == effect and (name == MEAN) == (driver == MEAN)]
+        drivers = [name for name in alike if scores[name, effect] > top - CLASS_WIDTH]
         drivers.sort(key=lambda other: (other != driver, -scores[other, effect]))
         weights = np.array(list(sums.units.values()), dtype=np.float64)
         return Name(

@@ -26,6 +26,10 @@ class Attributes:
         every = (name for known in (self.serial, self.run) for values in known.values() for name in values)
         return list(dict.fromkeys(every))
 
+    def values(self, name: str) -> list[str]:
+        """All known values of an attribute, of units and of runs."""
+        return [values[name] for known in (self.serial, self.run) for values in known.values() if name in values]
+
     def of(self, serial: str, run: str, name: str) -> str:
         """The value of a unit in a run: its own, or that of the run; empty where neither is known."""
         of_unit = self.serial.get(serial, {}).get(name, "")

@@ -2,8 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from datetime import UTC, date, datetime
+from collections.abc import Iterable, Mapping
 from io import StringIO
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -64,9 +63,6 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
             counts[kind] += 1
             if kind != "unchanged":
                 new.setdefault(subject, {})[name] = value
-    merged = {subject: {**known.get(subject, {}), **texts} for subject, texts in values.items()}
-    of_name = {name: [v for texts in {**known, **merged}.values() if (v := texts.get(name))] for name in names}
-    today = datetime.now(UTC).date().isoformat()
     file = _append(archive, {"by": by, "source": source, "values": new, **provenance()}) if new else ""
     infos = archive.runs()
     present = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
@@ -79,46 +75,23 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
         "unknown": unknown,
         "similar": similar,
         "refused": refused,
-        "quantities": [name for name in names if as_numbers(of_name[name])],
-        "mixed": {name: text for name in names if (text := _stray(of_name[name]))},
-        "future": {
-            name: max(days) for name in names if (days := [v for v in of_name[name] if _DAY.fullmatch(v) and v > today])
-        },
+        "quantities": [name for name in names if as_numbers(known_attributes(archive).values(name)) is not None],
         "file": file,
     }
 
 
-def as_numbers(values: Sequence[str]) -> dict[str, float] | None:
+def as_numbers(values: Iterable[str]) -> dict[str, float] | None:
     """Numbers by text if the values are a quantity (dates, as days; or numbers, some with a fraction); None for labels."""
     present = {value for value in values if value}
-    if present and all(_DAY.fullmatch(value) for value in present):
-        return (
-            None if _no_day(present) else {value: float(np.datetime64(value, "D").astype(float)) for value in present}
-        )
+    days = bool(present) and all(_DAY.fullmatch(value) for value in present)
     try:
-        numbers = {value: float(value) for value in present}
+        numbers = {value: float(np.datetime64(value, "D").astype(float) if days else value) for value in present}
     except ValueError:
         return None
+    if days:
+        return numbers
     finite = all(math.isfinite(number) for number in numbers.values())
     return numbers if finite and any(not number.is_integer() for number in numbers.values()) else None
-
-
-def _stray(values: Sequence[str]) -> str:
-    """A value that makes labels of a quantity: the first that is none where most values are; empty where there is none."""
-    numbers = [value for value in values if as_numbers([value, "0.5"]) or _DAY.fullmatch(value)]
-    if as_numbers(values) or not as_numbers(numbers) or 2 * len(numbers) <= len(values):
-        return ""
-    return next(value for value in values if value not in set(numbers))
-
-
-def _no_day(values: Iterable[str]) -> str:
-    """The first of some values that is written as a day and that no calendar has, such as 2026-02-30; empty for none."""
-    for value in values:
-        try:
-            _ = _DAY.fullmatch(value) and date.fromisoformat(value)
-        except ValueError:
-            return value
-    return ""
 
 
 def _append(archive: Archive, content: Mapping[str, Any]) -> str:
@@ -153,7 +126,7 @@ def _values(table: pd.DataFrame, key: str, names: list[str], source: str) -> dic
         texts = out.setdefault(subject, {})
         for name in names:
             value = _text(row[name])
-            if _no_day([value]):
+            if _DAY.fullmatch(value) and as_numbers([value]) is None:
                 raise WrongUse(
                     f"attributes: {source} has {value} as {name} of {subject}, which no calendar has; correct it or empty it"
                 )
@@ -184,11 +157,6 @@ def sentences(added: AddedAttributes) -> list[str]:
     labels = [name for name in added["names"] if name not in added["quantities"]]
     kinds = (("quantities", added["quantities"]), ("labels", labels))
     lines.append("; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds if names))
-    lines += [
-        f"{name}: labels, because '{value}' is no number; leave unknown values empty"
-        for name, value in added["mixed"].items()
-    ]
-    lines += [f"{name}: {day} is in the future" for name, day in added["future"].items()]
     if added["unknown"]:
         counted = number_of(len(added["unknown"]), str(added["by"]))
         lines.append(f"not in the archive yet: {counted} ({_some(added['unknown'], _SHOWN)}); they are kept")
@@ -257,5 +225,5 @@ def listed(archive: Archive) -> ListedAttributes:
     return {"attributes": rows}
 
 
-def _some(texts: Sequence[str], most: int) -> str:
+def _some(texts: list[str], most: int) -> str:
     return ", ".join(texts[:most]) + (", …" if len(texts) > most else "")

@@ -198,8 +198,6 @@ class AddedAttributes(TypedDict):
     similar: Annotated[dict[str, list[str]], "of the first five unknown ones, those of the archive that are similar"]
     refused: Annotated[list[str], "columns that follow from the result of a calibration, and were not taken"]
     quantities: Annotated[list[str], "attributes that are judged as numbers or days; the others are labels"]
-    mixed: Annotated[dict[str, str], "labels most of whose values are numbers, with one that is none"]
-    future: Annotated[dict[str, str], "attributes with a day in the future, and the latest"]
     file: Annotated[str, "where they are kept, in the archive"]
 
 

@@ -120,11 +120,9 @@ def _visible(found: Discoveries) -> tuple[list[ReachRow], list[UntoldEffect]]:
 def _drivers(source: DiscoveryArchive, state: Evidences) -> list[DriverRow]:
     judged = list(dict.fromkeys(map(plain, state.sensor.drivers)))
     rows: list[DriverRow] = [{"name": name, "status": "judged"} for name in judged]
-    known = [values for by in (source.attributes.serial, source.attributes.run) for values in by.values()]
     for name in source.attributes.names():
         if name not in judged:
-            levels = {value for values in known if (value := values.get(name))}
-            status = "one level" if len(levels) < 2 else "no unit of a pooled lot has it"
+            status = "one level" if len(set(source.attributes.values(name))) < 2 else "no unit of a pooled lot has it"
             rows.append({"name": name, "status": status})
     return rows
 

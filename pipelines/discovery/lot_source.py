@@ -217,8 +217,7 @@ class DiscoveryArchive:
         for name in self.attributes.names():
             if name in {MEAN, STATION, SLOT, UNIT, DATE}:
                 continue
-            every = (by_key.values() for by_key in (self.attributes.serial, self.attributes.run))
-            out[name] = as_numbers([value.get(name, "") for values in every for value in values])
+            out[name] = as_numbers(self.attributes.values(name))
         return out
 
     def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:
