@@ -74,10 +74,6 @@ class Discoveries:
             unexplained.setdefault(plain(alarm.driver), self._unexplained_row(plain(alarm.driver), axis, effect))
         return rows, list(unexplained.values())
 
-    def some(self, most: int) -> list[ScoredLot]:
-        """At most ``most`` lots, evenly spread over the order of arrival."""
-        return [sensor for sensor, _ in self.source.lots([self.state.order[k] for k in self._spread(most)])]
-
     @cached_property
     def named(self) -> list[Discovery]:
         """Named effects with an alarm, in the order of their first alarm."""
@@ -105,13 +101,17 @@ class Discoveries:
         needed = max(self.state.least_needed(alarm.driver) for alarm in self._of_sensor)
         return self.source.pool.names(self._lots, alarms, needed)
 
+    def some(self, most: int) -> list[tuple[ScoredLot, ScoredLot]]:
+        """At most ``most`` lots, of the sensors and of the station, evenly spread over the order of arrival."""
+        return [*self.source.lots(self.state.order[k] for k in self._spread(most))]
+
     @cached_property
     def _both(self) -> list[tuple[ScoredLot, ScoredLot]]:
-        """The lots used for naming, of the sensors and of the station."""
-        return [*self.source.lots([self.state.order[k] for k in self._spread(MOST_NAMED)])]
+        return self.some(MOST_NAMED)
 
     @cached_property
     def _lots(self) -> list[ScoredLot]:
+        """The lots used for naming."""
         return [sensor for sensor, _ in self._both]
 
     @cached_property

@@ -93,7 +93,7 @@ def _visible(found: Discoveries) -> tuple[list[ReachRow], list[UntoldEffect]]:
     if lots < FIRST:
         return [], []
     some = found.some(_SOME)  # for quantities that are similar in all lots
-    inside = np.mean([lot.own.sum(axis=0) for lot in some], axis=0) * lots
+    inside = np.mean([lot.own.sum(axis=0) for lot, _ in some], axis=0) * lots
     between, within = sensor.noise
     times = np.sqrt(2.0 * (found.state.least_needed() + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
     rows: list[ReachRow] = []

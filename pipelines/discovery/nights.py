@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from itertools import groupby
 from typing import Any
 
+from inertial.discovery.running_sums import FIRST
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
@@ -97,7 +98,7 @@ def _write(
     nights: Sequence[Mapping[str, Any]],
 ) -> None:
     """Write the entry of a night, which is never rewritten, and the state as a cache."""
-    data = state_bytes(state)
+    data = state_bytes(state) if len(state.order) >= FIRST else b""  # the first lots wait, and are read again
     entry = {
         "night": state.night,
         "when": datetime.now(UTC).isoformat(timespec="seconds"),

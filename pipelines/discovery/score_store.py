@@ -164,8 +164,8 @@ def content_of(data: bytes) -> Content | None:
 def run_of(row: Mapping[str, Any], products: Mapping[str, Products]) -> ScoredRun:
     """The run of a row of a file."""
     scores = None if row["left_out"] else _unpacked(row, products[row["columns"]])
-    texts = {name: row[name] for name in TEXTS}
-    return ScoredRun(**texts, **{name: tuple(row[name]) for name in _BY_UNIT}, scores=scores)
+    fields: dict[str, Any] = {name: row[name] for name in TEXTS} | {name: tuple(row[name]) for name in _BY_UNIT}
+    return ScoredRun(**fields, scores=scores)
 
 
 def _packed(scores: LotScores) -> dict[str, bytes]:
