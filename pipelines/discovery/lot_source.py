@@ -112,6 +112,11 @@ class DiscoveryArchive:
         """The attributes of units and runs."""
         return known_attributes(self.archive)
 
+    def known_until(self, when: str) -> None:
+        """Judge the next lots by the attributes that were known at a time; empty: by all."""
+        self.attributes = known_attributes(self.archive, when)
+        self.__dict__.pop("_quantities", None)
+
     @cached_property
     def revoked(self) -> set[str]:
         """Runs with a revoked calibration."""

@@ -48,14 +48,11 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
         nights = [files.read_json(path) for path in _listed(folder / "nights") if path.name.endswith(".json")]
         state = stored_state(source, folder, nights)
         if state is None:
-            state = _replayed(source, nights)
+            state = _replayed(source, nights, ())
         gone = [run for run in state.order if run in source.revoked]
         if gone:
-            remaining = [run for run in state.order if run not in source.revoked]
-            grown = grown_by_days(source, Evidences.fresh(source), remaining)
-            grown.taken_out, grown.night = [*state.taken_out, *gone], state.night
-            grown.alarms = [*state.alarms, *state.unknown(grown.alarms)]
-            state = grown
+            night, state = state.night, _replayed(source, nights, gone)
+            state.night = night
         counted = {*state.order, *state.taken_out}
         new = [run for run in source.pooled() if run not in counted and run not in source.revoked]
         if new or gone:
@@ -70,14 +67,19 @@ def _listed(folder: Place) -> list[Place]:
     return sorted(folder.iterdir(), key=lambda path: path.name) if folder.is_dir() else []
 
 
-def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> Evidences:
-    """The evidence, computed again in the order of the ledger; lots without scores or removed later are left out."""
+def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]], gone: Sequence[str]) -> Evidences:
+    """The evidence, computed again in the order of the ledger, with the attributes that were known in each night.
+
+    Lots without scores, those removed later and those that are ``gone`` now are left out.
+    """
     state = Evidences.fresh(source)
-    state.taken_out = [run for night in nights for run in night["taken_out"]]
+    state.taken_out = [*(run for night in nights for run in night["taken_out"]), *gone]
     out = set(state.taken_out)
     for night in nights:
+        source.known_until(night["when"])
         runs = [run for run in night["runs"] if run in source.store.heads and run not in out]
         state = grown_by_days(source, state, runs)
+    source.known_until("")
     # an alarm that was raised remains, even if a run that contributed to it was removed since
     index = {str(hypothesis): at for at, hypothesis in enumerate(state.hypotheses)}
     state.alarms += state.unknown(

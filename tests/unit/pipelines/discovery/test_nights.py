@@ -106,6 +106,21 @@ def test_the_size_of_an_error_of_a_station_is_what_the_models_of_its_lots_leave(
     assert row["size_ug"] == pytest.approx(np.sqrt(np.mean(left**2) * 2.0 / 9.0), rel=0.15)
 
 
+def test_sums_that_are_lost_are_made_again_with_what_was_known_in_each_night(tmp_path: Path) -> None:
+    """An attribute that is added after the lots were judged is no evidence in them, now or after the sums were lost."""
+    made = wafer_line(tmp_path)
+    archive = Archive(str(made.folder))
+    assert discovered(archive, Look()).document["discoveries"] == []
+    (entry,) = nights(archive)
+    night = json.loads(entry.read_bytes())
+    entry.write_bytes(files.json_bytes({**night, "when": "2026-01-01T00:00:00+00:00"}))  # long before the attributes
+    add_attributes(archive, pd.read_csv(made.units, dtype=str), "serial", "units.csv")
+    assert discovered(archive, Look()).document["discoveries"] == []
+    (entry.parent.parent / "state").unlink()
+    assert discovered(archive, Look()).document["discoveries"] == []
+    assert discovered(archive, Look(looking_back=True)).document["discoveries"]
+
+
 def test_a_second_night_adds_an_entry_and_rewrites_none(archive: Archive) -> None:
     source = DiscoveryArchive(archive)
     every = source.pooled()
