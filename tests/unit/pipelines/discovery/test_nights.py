@@ -93,6 +93,7 @@ def test_the_same_dwells_in_another_run_count_once(tmp_path: Path) -> None:
 def test_the_size_of_an_error_of_a_station_is_what_the_models_of_its_lots_leave(tmp_path: Path) -> None:
     archive, line = Archive(str(tmp_path / "archive")), Line(5, units=2)
     archive.prepare()
+    dwells, leaning = pd.DataFrame(), np.zeros((0, 3))
     for number in range(66):
         dwells, about = line.lot(STATIONS[number % 3])
         leaning = to_fixture((200e-6, 0.0, 0.0), *np.radians(dwells[["outer_deg", "inner_deg"]].to_numpy().T))
