@@ -16,13 +16,16 @@ class DriverSums(Levels):
 
     units : number of units of each level · about : origin from which a number is counted
     inside, between : information from differences within lots, and from the means of lots
+    spread : rms of the numbers over the units, about the origin; 1 for labels
     """
 
     def __init__(self, driver: str, lots: Sequence[ScoredLot]) -> None:
         super().__init__(lots[0].information.size)
         self.driver, self.units, self.inside, self.between = driver, Counter[str](), 0.0, 0.0
         means = [float(numbers.mean()) for lot in lots if (numbers := lot.number(driver)) is not None]
-        self.about = float(np.nanmean(means)) if means else 0.0
+        self.about, self.spread = float(np.nanmean(means)) if means else 0.0, 1.0
+        self._squares = np.zeros(2)  # of the numbers about the origin: their number and sum
+        self._within = Levels(lots[0].information.size)
 
     @property
     def labels(self) -> list[str]:
@@ -41,8 +44,8 @@ class DriverSums(Levels):
 
     @property
     def centred(self) -> Array:
-        """Scores (g, h) of levels; for a driver judged within lots only, about the mean over all levels."""
-        if not self.inside_only or len(self.labels) < 2:
+        """Scores (g, h) of levels about the mean over all levels: what they have in common is of the driver "mean"."""
+        if len(self.place) < 2:
             return self.score
         return self.score - self.information * over(self.score.sum(axis=0), self.information.sum(axis=0))
 
@@ -82,6 +85,7 @@ class DriverSums(Levels):
                 share = of_level / total
                 score, information = left[here].sum(axis=0) / within, of_level * (1.0 - share) / within
                 self.inside += float(information.sum())
+                self._within.add((label,), score[None], information[None])
                 if not self.inside_only:  # add the information of the lot's mean
                     common = share**2 * info / between
                     score, information = score + share * sums / between, information + common
@@ -94,7 +98,21 @@ class DriverSums(Levels):
             score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - info * mean) / between
             inside, common = (about**2 * by_unit).sum(axis=0) / within, centre**2 * info / between
             self.inside, self.between = self.inside + float(inside.sum()), self.between + float(common.sum())
+            self._squares += len(numbers), float((from_origin**2).sum())
             self._add_level(SLOPE, score, inside + common, len(lot.units))
+
+    def complete(self) -> None:
+        """Conclude the sums after the last lot.
+
+        Within lots a level differs from the mean of the lot; about the mean of all levels, to which its share w of the units
+        contributes, that is 1 − w of what it differs.
+        """
+        units = sum(self.units.values())
+        for label, at in self.place.items() if len(self.place) > 1 else ():
+            share = self.units[label] / units
+            self._sums[1, at] += self._within.of(label)[1] * share / (1.0 - share)
+        count, squares = self._squares
+        self.spread = float(np.sqrt(squares / count)) if squares > 0.0 else 1.0
 
     def _add_level(self, label: str, score: Array, information: Array, units: int) -> None:
         """Add scores and information (h,) of some units to a level."""
@@ -117,6 +135,8 @@ def gathered(
     for lot in lots:
         for sums in out.values():
             sums.gather(lot, means[lot.station], noise, seen)
+    for sums in out.values():
+        sums.complete()
     return {name: sums for name, sums in out.items() if sums.labels}
 
 
@@ -141,4 +161,4 @@ def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float
         warnings.simplefilter("ignore", RuntimeWarning)  # an effect that no lot shows is nan for all of them
         many = np.nanmedian(np.clip(np.array(between), 0.0, np.nanquantile(between, 0.99)), axis=0) / NORMAL_MEDIAN**2
         few = np.nanmedian(np.array(within), axis=0)
-    return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))
+        return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))

@@ -7,7 +7,7 @@ The hypotheses are every column on every axis and, in addition, each effect with
 the scores of a lot are jointly symmetric.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ from scipy.special import chdtrc, stdtr
 
 from inertial.arrays import NORMAL_MEDIAN, Array, Flags, Places, over
 from inertial.discovery.running_sums import BOUND, FIRST, Levels, Scale, Sums
-from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander
+from inertial.discovery.station_wander import WALK_FROM, Innovation, Level, Wander
 
 SHRUNK = 4.0
 """Prior information, in typical lots, that shrinks the predicted size of a level towards zero."""
@@ -107,7 +107,7 @@ class Evidence:
         self.levels: dict[str, Levels] = {}
         self.wander = Wander(count)
         self.score, self.information = np.zeros(count), np.zeros(count)
-        self._earlier = earlier
+        self.earlier = earlier
         self._held: list[ScoredLot] = []
         self._scales: dict[str, Scale] = {}
         self._numbers: dict[str, tuple[float, float, float]] = {}  # count, mean, sum of squares
@@ -274,7 +274,7 @@ class Evidence:
         scale, typical = self._scales["inside"], self._typical
         limit = BOUND * scale.rms * root
         left = np.clip(free, -limit, limit)
-        units = {} if self._earlier is None else {UNIT: lot.units}
+        units = {} if self.earlier is None else {UNIT: lot.units}
         for name, labels in {**lot.levels, **units}.items():
             if not any(labels):
                 continue
@@ -311,40 +311,36 @@ class Evidence:
 
     def _of_units(self, units: tuple[str, ...]) -> Array:
         """Sizes (units, h) of the units in their earlier lots; zero for a unit measured for the first time."""
-        before = (None if self._earlier is None else self._earlier(unit, self._taken) for unit in units)
+        before = (None if self.earlier is None else self.earlier(unit, self._taken) for unit in units)
         return np.array([np.zeros(self.count) if of_unit is None else over(*of_unit) for of_unit in before])
 
-    def arrays(self) -> dict[str, Any]:
-        """The state as nested arrays, for :meth:`restored`."""
-        flags = {name: np.full(self.size, float(sums.two_sided)) for name, sums in self.drivers.items()}
-        return {
-            "sums": np.stack([self.score, self.information]),
-            "counts": np.array([self.lots, self._taken]),
-            "drivers": {name: np.stack([sums.s, sums.v, flags[name]]) for name, sums in self.drivers.items()},
-            "levels": {name: levels.arrays() for name, levels in self.levels.items()},
-            "scales": {name: scale.sums for name, scale in self._scales.items()},
-            "numbers": {name: np.array(values) for name, values in self._numbers.items()},
-            "wander": self.wander.arrays(),
-        }
 
-    @classmethod
-    def restored(
-        cls,
-        count: int,
-        arrays: Mapping[str, Any],
-        earlier: Callable[[str, int], tuple[Array, Array] | None] | None = None,
-        columns: Places | None = None,
-    ) -> "Evidence":
-        """The evidence with the state of :meth:`arrays`."""
-        new = cls(count, earlier, columns)
-        new.score, new.information = arrays["sums"].copy()
-        new.lots, new._taken = arrays["counts"].tolist()
-        for name, value in arrays.get("drivers", {}).items():
-            new.drivers[name] = Sums(*value[:2].copy(), two_sided=bool(value[2].any()), effects=new.effects)
-        new.levels = {name: Levels.restored(value) for name, value in arrays.get("levels", {}).items()}
-        for name, value in arrays.get("scales", {}).items():
-            new._scales[name] = Scale(np.ones(count))
-            new._scales[name].sums = value.copy()
-        new._numbers = {name: tuple(value.tolist()) for name, value in arrays.get("numbers", {}).items()}
-        new.wander = Wander.restored(arrays["wander"])
-        return new
+_KINDS = {kind.__name__: kind for kind in (Evidence, Sums, Levels, Scale, Wander, Level)}
+"""Classes of which the state of an evidence consists."""
+
+
+def stored(value: Any, arrays: list[Any]) -> Any:
+    """A state as what JSON holds, for :func:`restored`; its arrays are appended to ``arrays``."""
+    if isinstance(value, np.ndarray):
+        arrays.append(value)
+        return {"array": len(arrays) - 1}
+    if isinstance(value, dict):
+        return {"items": {name: stored(part, arrays) for name, part in value.items()}}
+    if type(value).__name__ in _KINDS:
+        parts = {name: part for name, part in vars(value).items() if not callable(part)}
+        return {"kind": type(value).__name__, **stored(parts, arrays)}
+    return value
+
+
+def restored(plain: Any, arrays: Sequence[Any]) -> Any:
+    """The state of :func:`stored`; the function ``earlier`` of an evidence of units is to be set again."""
+    if not isinstance(plain, dict):
+        return plain
+    if "array" in plain:
+        return arrays[plain["array"]]
+    items = {name: restored(part, arrays) for name, part in plain["items"].items()}
+    if "kind" not in plain:
+        return items
+    made = object.__new__(_KINDS[plain["kind"]])
+    vars(made).update(items)
+    return made

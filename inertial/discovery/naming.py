@@ -5,7 +5,7 @@ D − k(1 + ln(D/k)), the price of coefficients with estimated variance. Effects
 is subtracted from all sums by the products of the columns, and the remainder is searched again, finally for any function of pose.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,6 +24,11 @@ _MOST = 6
 """Largest number of names of one evaluation."""
 
 _TURNS = 5  # iterations of a fit of columns and levels that share lots
+
+_RELAXED = 2.0 / 3.0
+"""Part of the fitted sizes of levels that an iteration subtracts. Where lots have levels in pairs, each shows half of the other
+with the opposite sign, and a full step would turn it round; of modes with 1 to 2 times the information it leaves a third at most.
+"""
 
 _INEXACT = 0.02
 """Relative uncertainty of a score: products of columns are means over lots, parameters are at the middle of their range."""
@@ -128,25 +133,32 @@ class Pool:
         while True:
             sums, scores, significant = self._judged(lots, drivers, needed)
             of_pose.append({pair: score for pair, score in scores.items() if pair[1] == SHAPE})
+            if found:
+                # what the best of a class does not take away is another effect, with the same score by chance
+                most = needed + max(CLASS_WIDTH, _INEXACT * found[-1].score)
+                best, driver = found[-1].effects[0], found[-1].drivers[0]
+                same = tuple(e for e in found[-1].effects if e == best or scores.get((driver, e), 0.0) <= most)
+                found[-1] = replace(found[-1], effects=same)
             pairs = [
                 (scores[pair], *pair)
                 for pair in significant
                 if pair[1] != SHAPE
                 # a remainder of other names is named only if it had an alarm itself and a clearly higher score
-                and (not found or (pair in alarmed and scores[pair] > needed + CLASS_WIDTH))
+                and (pair in alarmed and scores[pair] > needed + CLASS_WIDTH if found else self._raised(pair, alarmed))
             ]
-            new = (name for name in self._in_order(pairs, sums, scores) if not self._already_named(found, name))
-            name = next(new, None)
+            every_name = (self._name(sums[driver], effect, scores) for _, driver, effect in sorted(pairs, reverse=True))
+            name = next((name for name in every_name if not self._already_named(found, name)), None)
             if name is None or len(found) == _MOST:
                 break
-            found.append(name)
-            lots = self._subtracted(lots, name.drivers[0], name.effects[0])
+            lots, *fitted = self._subtracted(lots, name.drivers[0], name.effects[0])
+            sizes, errors = self._sizes(sums[name.drivers[0]], name.effects[0], *fitted)
+            found.append(replace(name, sizes=sizes, errors=errors))
         imitations = _imitations(found, of_pose, needed)
         genuine = [name for at, name in enumerate(found) if at not in imitations]
         if len(genuine) < len(found):
             lots = every
             for name in genuine:
-                lots = self._subtracted(lots, name.drivers[0], name.effects[0])
+                lots, *_ = self._subtracted(lots, name.drivers[0], name.effects[0])
         return genuine, self._unnamed(lots, genuine, drivers, needed)
 
     def _unnamed(
@@ -162,7 +174,7 @@ class Pool:
                 break
             out.append(self._shape(sums[best[0]], scores[best]))
             least = max(least, _REMAINDER * scores[best])
-            lots = self._subtracted(lots, *best)
+            lots, *_ = self._subtracted(lots, *best)
         return out
 
     def _judged(
@@ -207,14 +219,15 @@ class Pool:
         covariances = np.stack([covariance[:, axis, :, axis] for axis in range(self.axes)])
         return np.moveaxis(sizes.reshape(len(root), self.axes, -1), 1, 0), covariances
 
-    def _in_order(
-        self, pairs: Sequence[tuple[float, str, str]], sums: Mapping[str, DriverSums], scores: Scores
-    ) -> Iterator[Name]:
-        """Pairs of score, driver and effect as names, the best first."""
-        for top, best, effect in sorted(pairs, reverse=True):
-            # an effect that differs by level has a nonzero mean, too: such a driver is preferred to the mean
-            same = (n for score, n, other in pairs if other == effect and n != MEAN and score > top - CLASS_WIDTH)
-            yield self._name(sums[next(same, best)], effect, scores)
+    def _raised(self, pair: tuple[str, str], alarmed: Iterable[tuple[str, str]]) -> bool:
+        """Whether an effect or one with similar columns, or any function of the pose, had an alarm by a driver."""
+        driver, effect = pair
+        return any(by == driver and (other == SHAPE or self._alike(effect, other)) for by, other in alarmed)
+
+    def _alike(self, effect: str, other: str) -> bool:
+        """Whether two effects are the same or have columns that are nearly proportional."""
+        cosines = self.lot[np.ix_(self.everywhere(effect), self.everywhere(other))]
+        return effect == other or bool(np.abs(cosines).max() > _ALIKE)
 
     def _already_named(self, found: Sequence[Name], new: Name) -> bool:
         """Whether a name repeats an earlier one, or is the remainder of one whose column is not exactly that of its effect."""
@@ -222,25 +235,37 @@ class Pool:
         for name in found:
             inexact = effects_catalogue.get(name.effects[0]).nonlinear
             little = new.score < (_REMAINDER_OF_SHAPE if inexact else _REMAINDER) * name.score
-            cosines = self.lot[np.ix_(self.everywhere(effect), self.everywhere(name.effects[0]))]
-            alike = set(new.effects) & set(name.effects) or np.abs(cosines).max() > _ALIKE
+            alike = set(new.effects) & set(name.effects) or self._alike(effect, name.effects[0])
             if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):
                 return True
         return False
 
-    def _subtracted(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
-        """The lots with an effect of a driver subtracted, iterated because its columns and levels share lots."""
+    def _subtracted(
+        self, lots: Sequence[ScoredLot], driver: str, effect: str
+    ) -> tuple[Sequence[ScoredLot], Array, Array]:
+        """The lots with an effect of a driver subtracted, iterated because its columns and levels share lots.
+
+        Returns
+        -------
+        lots, sizes (axes, levels, p) of the columns as fitted together, and their covariances (axes, levels, p, p)
+        """
+        taken: Array | float = 0.0
+        fitted, covariance = np.zeros((2, self.axes, 0))
         for _ in range(_TURNS):
             sums = gathered(lots, [driver]).get(driver)
             if sums is None or self.score(sums, effect) < 1.0:
                 break
             sizes, covariance = self._fitted(sums, effect)
+            fitted = taken + sizes
             if len(sums.labels) > 1:  # sizes of levels are shrunk towards zero according to their noise
                 noise = np.maximum(np.diagonal(covariance, axis1=2, axis2=3), 0.0).sum(axis=1)
                 share = 1.0 - noise / np.maximum((sizes**2).sum(axis=1), 1e-300)
-                sizes = sizes * np.clip(share, 0.0, 1.0)[:, None]
+                sizes = _RELAXED * sizes * np.clip(share, 0.0, 1.0)[:, None]
+            taken = taken + sizes
             lots = [self.without(lot, sums, effect, sizes) for lot in lots]
-        return lots
+        if driver != MEAN:
+            lots, *_ = self._subtracted(lots, MEAN, effect)  # sizes are about the mean of levels, or of numbers
+        return lots, fitted, covariance
 
     def _crossed(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> Iterator[tuple[str, Array]]:
         """For each lot and driver, the product of the lot's scores and their prediction by the other half, (effects,)."""
@@ -355,7 +380,7 @@ class Pool:
         info = sums.information[:, here]
         z = over(sums.centred[:, here], np.sqrt(np.maximum(info, 0.0)))
         drop, rank = float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
-        k = float(np.sum(rank) - (np.count_nonzero(rank) if sums.inside_only else 0))
+        k = float(np.sum(rank) - (np.count_nonzero(rank) if len(sums.place) > 1 else 0))
         return max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
 
     def _name(self, sums: DriverSums, effect: str, scores: Scores) -> Name:
@@ -369,14 +394,35 @@ class Pool:
 
         least = top - max(CLASS_WIDTH, _INEXACT * top)
         effects = sorted((e for e in self.effects if scores[driver, e] > least and e != SHAPE), key=rank)
-        drivers = [name for name, of in scores if of == effect and scores[name, of] > top - CLASS_WIDTH]
+        # what all lots have in common is another statement than what differs
+        alike = [name for name, of in scores if of == effect and (name == MEAN) == (driver == MEAN)]
+        drivers = [name for name in alike if scores[name, effect] > top - CLASS_WIDTH]
         drivers.sort(key=lambda other: (other != driver, -scores[other, effect]))
-        here = self.everywhere(effects[0]).reshape(self.axes, -1)[:, 0]
-        info = sums.information[:, here]
-        sizes = over(sums.centred[:, here], info) * self.size[here]
-        errors = np.where(info > 0.0, over(1.0, np.sqrt(np.maximum(info, 0.0))), np.inf) * self.size[here]
         weights = np.array(list(sums.units.values()), dtype=np.float64)
-        return Name(tuple(effects), tuple(drivers), tuple(sums.labels), weights, sizes, errors, top)
+        return Name(
+            tuple(effects),
+            tuple(drivers),
+            tuple(sums.labels),
+            weights,
+            *self._sizes(sums, effects[0], *self._fitted(sums, effects[0])),
+            top,
+        )
+
+    def _sizes(self, sums: DriverSums, effect: str, coefficients: Array, covariances: Array) -> tuple[Array, Array]:
+        """Rms over the dwells, g, of an effect with all its columns by level and axis, (levels, axes), and standard errors.
+
+        Of a number: rms over the units, too.
+
+        The sign is that of the column with the largest sum of squares; an error is infinite where no lot shows the axis.
+        """
+        at = self.places(effect)
+        size = sums.spread * self.size[self.everywhere(effect)].reshape(self.axes, 1, -1)
+        columns, covariances = coefficients * size, covariances * size[..., None] * size[..., None, :]
+        among = self.inside[:, at[:, None], at]
+        squares = np.einsum("agp,apq,agq->ga", columns, among, columns)
+        errors = np.sqrt(np.maximum(np.einsum("apq,agqp->ga", among, covariances), 0.0))
+        largest = columns[..., int(np.argmax(np.sum(columns**2, axis=(0, 1))))].T
+        return np.copysign(np.sqrt(np.maximum(squares, 0.0)), largest), np.where(errors > 0.0, errors, np.inf)
 
 
 def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float) -> set[int]:

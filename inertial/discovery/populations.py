@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from scipy import optimize, special
+from scipy import optimize, special, stats
 
 from inertial.arrays import Array
 
@@ -107,11 +107,8 @@ def _one_peak(z: Array) -> float:
     """Largest log likelihood of values under one unimodal distribution: Student's t, sinh-arcsinh, generalised normal."""
 
     def student(theta: Array) -> float:
-        scale = float(np.clip(theta[1], _LEAST, 5.0))
-        width, nu = np.exp(scale), 1.0 + np.exp(min(float(theta[2]), 8.0))
-        about = (z - theta[0]) / width
-        constant = special.gammaln(0.5 * (nu + 1.0)) - special.gammaln(0.5 * nu) - 0.5 * np.log(nu * np.pi) - scale
-        return -float(constant * z.size - 0.5 * (nu + 1.0) * np.log1p(about**2 / nu).sum())
+        width, nu = np.exp(np.clip(theta[1], _LEAST, 5.0)), 1.0 + np.exp(min(float(theta[2]), 8.0))
+        return -float(stats.t.logpdf(z, nu, theta[0], width).sum())
 
     def sinh_arcsinh(theta: Array) -> float:
         # width and tails are bounded: a narrow distribution with wide tails could have any density at a single value
@@ -123,10 +120,8 @@ def _one_peak(z: Array) -> float:
         return -float((log - scale - 0.5 * np.log(2.0 * np.pi)).sum())
 
     def flat(theta: Array) -> float:
-        scale, power = float(np.clip(theta[1], _LEAST, 5.0)), np.exp(float(np.clip(theta[2], 0.0, 4.0)))
-        about = np.abs(z - theta[0]) / np.exp(scale)
-        constant = np.log(0.5 * power) - scale - special.gammaln(1.0 / power)
-        return -float(constant * z.size - np.minimum(about**power, 1e6).sum())
+        width, power = np.exp(np.clip(theta[1], _LEAST, 5.0)), np.exp(np.clip(theta[2], 0.0, 4.0))
+        return -float(np.maximum(stats.gennorm.logpdf(z, power, theta[0], width), -1e6).sum())
 
     skewed = [(sinh_arcsinh, [0.0, 0.0, skew, 0.0]) for skew in (-0.5, 0.0, 0.5)]
     ends = {"xatol": 1e-3, "fatol": 1e-2}

@@ -4,12 +4,9 @@ Each increment x is, given all earlier lots, symmetric about zero under the null
 V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from inertial.arrays import Array, Places, over
@@ -110,18 +107,6 @@ class Levels:
                 more = np.zeros((2, max(16, at), self._sums.shape[2]))
                 self._sums = np.concatenate([self._sums, more], axis=1)
             self._sums[:, at] += score[unit], information[unit]
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """The labels, and the sums (2, levels, h), for :meth:`restored`."""
-        return {"labels": np.array(list(self.place), dtype=np.str_), "sums": self._sums[:, : len(self.place)]}
-
-    @classmethod
-    def restored(cls, arrays: Mapping[str, NDArray[Any]]) -> "Levels":
-        """The sums of :meth:`arrays`."""
-        new = cls(0)
-        new.place = {str(label): at for at, label in enumerate(arrays["labels"])}
-        new._sums = arrays["sums"].copy()
-        return new
 
 
 class Scale:

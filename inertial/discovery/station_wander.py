@@ -6,10 +6,7 @@ noise is chosen by the likelihood of the past. Drivers are judged by the innovat
 passed through the same filter.
 """
 
-from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -134,20 +131,6 @@ class Wander:
         level.variance = np.where(seen, found.gain / safe, level.variance)
         level.known = level.known | seen
         self._lots += np.where(seen, 1.0 / safe, 0.0), seen
-
-    def arrays(self) -> dict[str, Any]:
-        """The state as nested arrays."""
-        stations = {station: vars(level) for station, level in self.stations.items()}
-        return {"likelihood": self.log_likelihood, "beside": self.beside, "lots": self._lots, "stations": stations}
-
-    @classmethod
-    def restored(cls, arrays: Mapping[str, Any]) -> "Wander":
-        """The filters with the state of :meth:`arrays`."""
-        new = cls(0)
-        new.log_likelihood, new._lots = arrays["likelihood"].copy(), arrays["lots"].copy()
-        new.beside = {name: value.copy() for name, value in arrays.get("beside", {}).items()}
-        new.stations = {station: Level(**deepcopy(level)) for station, level in arrays.get("stations", {}).items()}
-        return new
 
 
 def _likelihood(every: Array, found: Innovation) -> Array:

@@ -19,12 +19,15 @@ class Attributes:
 
     serial: Mapping[str, Mapping[str, str]]
     run: Mapping[str, Mapping[str, str]]
-    entries: int
 
     def names(self) -> list[str]:
         """Names of all attributes, in order of appearance."""
         every = (name for known in (self.serial, self.run) for values in known.values() for name in values)
         return list(dict.fromkeys(every))
+
+    def values(self, name: str) -> list[str]:
+        """All known values of an attribute, of units and of runs."""
+        return [values[name] for known in (self.serial, self.run) for values in known.values() if name in values]
 
     def of(self, serial: str, run: str, name: str) -> str:
         """The value of a unit in a run: its own, or that of the run; empty where neither is known."""
@@ -32,15 +35,16 @@ class Attributes:
         return of_unit or self.run.get(run, {}).get(name, "")
 
 
-def known_attributes(archive: Archive) -> Attributes:
-    """All attributes of an archive."""
+def known_attributes(archive: Archive, until: str = "") -> Attributes:
+    """The attributes of an archive; with a time in UTC, only what was known then, to the second."""
     known: dict[str, dict[str, dict[str, str]]] = {"serial": {}, "run": {}}
-    entries = attribute_files(archive)
-    for path in entries:
+    for path in attribute_files(archive):
         content = files.read_json(path)
+        if until and content["when"][:19] > until[:19]:
+            continue
         for key, values in content.get("values", {}).items():
             known[content["by"]].setdefault(key, {}).update({name: str(value) for name, value in values.items()})
-    return Attributes(known["serial"], known["run"], len(entries))
+    return Attributes(known["serial"], known["run"])
 
 
 def attribute_files(archive: Archive) -> list[Any]:

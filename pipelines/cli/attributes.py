@@ -46,8 +46,11 @@ def _print(document: ListedAttributes) -> None:
     if not rows:
         say("no attribute is known; add some with 'tumbleline attributes add FILE'")
         return
-    lines = [[row["attribute"], row["of"], str(row["known"]), str(row["levels"]), row["such_as"]] for row in rows]
-    print_table(["attribute", "of", "known", "levels", "such as"], lines)
+    lines = [
+        [row["attribute"], row["of"], str(row["known"]), str(row["levels"]), row["judged_as"], row["such_as"]]
+        for row in rows
+    ]
+    print_table(["attribute", "of", "known", "levels", "judged as", "such as"], lines)
 
 
 app = group(SUMMARY, {"add": add, "list": list_})

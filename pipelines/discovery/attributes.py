@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from io import StringIO
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -27,6 +27,7 @@ NOT_DRIVERS = {"grade", "outcome", "pass", "passed", "fail", "failed", "yield", 
 
 _SHOWN = 5
 _DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
+_DECIMAL_COMMA = r"^\s*([+-]?\d+),(\d+)\s*$"
 
 
 def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -> AddedAttributes:
@@ -74,19 +75,21 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
         "unknown": unknown,
         "similar": similar,
         "refused": refused,
+        "quantities": [name for name in names if as_numbers(known_attributes(archive).values(name)) is not None],
         "file": file,
     }
 
 
-def as_numbers(values: Sequence[str]) -> dict[str, float] | None:
+def as_numbers(values: Iterable[str]) -> dict[str, float] | None:
     """Numbers by text if the values are a quantity (dates, as days; or numbers, some with a fraction); None for labels."""
     present = {value for value in values if value}
-    if present and all(_DAY.fullmatch(value) for value in present):
-        return {value: float(np.datetime64(value, "D").astype(float)) for value in present}
+    days = bool(present) and all(_DAY.fullmatch(value) for value in present)
     try:
-        numbers = {value: float(value) for value in present}
+        numbers = {value: float(np.datetime64(value, "D").astype(float) if days else value) for value in present}
     except ValueError:
         return None
+    if days:
+        return numbers
     finite = all(math.isfinite(number) for number in numbers.values())
     return numbers if finite and any(not number.is_integer() for number in numbers.values()) else None
 
@@ -123,6 +126,10 @@ def _values(table: pd.DataFrame, key: str, names: list[str], source: str) -> dic
         texts = out.setdefault(subject, {})
         for name in names:
             value = _text(row[name])
+            if _DAY.fullmatch(value) and as_numbers([value]) is None:
+                raise WrongUse(
+                    f"attributes: {source} has {value} as {name} of {subject}, which no calendar has; correct it or empty it"
+                )
             if value and texts.get(name, value) != value:
                 raise WrongUse(
                     f"attributes: {source} has two values of {name} for {subject} ({texts[name]}, {value}), one is needed; "
@@ -147,6 +154,9 @@ def sentences(added: AddedAttributes) -> list[str]:
     what = ", ".join(added["names"])
     new = number_of(added["added"], "new value")
     lines = [f"{what}: {new}, {added['changed']} changed, {added['unchanged']} as before"]
+    labels = [name for name in added["names"] if name not in added["quantities"]]
+    kinds = (("quantities", added["quantities"]), ("labels", labels))
+    lines.append("; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds if names))
     if added["unknown"]:
         counted = number_of(len(added["unknown"]), str(added["by"]))
         lines.append(f"not in the archive yet: {counted} ({_some(added['unknown'], _SHOWN)}); they are kept")
@@ -185,7 +195,10 @@ def _text_table(path: Path) -> pd.DataFrame:
     """The cells of a text file as text; divided by commas, or by semicolons or tabs as spreadsheets of some countries save it."""
     text, _ = decoded(path.read_bytes(), path.name)
     head = text.partition("\n")[0]
-    rows = pd.read_csv(StringIO(text), sep=max(",;\t", key=head.count), header=None, dtype=str, keep_default_na=False)
+    divider = max(",;\t", key=head.count)
+    rows = pd.read_csv(StringIO(text), sep=divider, header=None, dtype=str, keep_default_na=False)
+    if divider != ",":
+        rows = rows.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
     return rows[1:].set_axis(list(rows.iloc[0]), axis=1)
 
 
@@ -200,10 +213,17 @@ def listed(archive: Archive) -> ListedAttributes:
             levels = sorted(set(values))
             examples = _some(levels, _EXAMPLES)
             rows.append(
-                {"attribute": name, "of": kind, "known": len(values), "levels": len(levels), "such_as": examples}
+                {
+                    "attribute": name,
+                    "of": kind,
+                    "known": len(values),
+                    "levels": len(levels),
+                    "judged_as": "quantity" if as_numbers(values) else "labels",
+                    "such_as": examples,
+                }
             )
     return {"attributes": rows}
 
 
-def _some(texts: Sequence[str], most: int) -> str:
+def _some(texts: list[str], most: int) -> str:
     return ", ".join(texts[:most]) + (", …" if len(texts) > most else "")

@@ -7,6 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from inertial.arrays import Array, Places, over
+from inertial.decisions import CLASS_WIDTH
+from inertial.discovery.driver_sums import DriverSums, gathered
 from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
 from inertial.discovery.naming import Name, Unnamed
 from inertial.discovery.pose_shape import SHAPE, angles_of, map_of
@@ -61,8 +63,8 @@ class Discoveries:
         """The discoveries, and what no effect explains: where nothing is named, every driver with an alarm."""
         rows = [self._named_row(discovery) for discovery in self.named]
         strongest: dict[str, Alarm] = {}
-        # columns of one table are nearly collinear: the strongest represents its driver
-        for alarm in sorted(self._of_station, key=lambda alarm: -self._log_e(alarm)):
+        # columns of one table are nearly collinear: that which explains most represents its driver
+        for alarm in sorted(self._of_station, key=self._explained, reverse=True):
             strongest.setdefault(alarm.driver, alarm)
         rows += [self._station_row(alarm) for alarm in sorted(strongest.values(), key=lambda alarm: alarm.lots)]
         rows += [self._thermometer_row()] if self._of_thermometer else []
@@ -71,10 +73,6 @@ class Discoveries:
             effect, _, axis = self.state.hypotheses[alarm.index]
             unexplained.setdefault(plain(alarm.driver), self._unexplained_row(plain(alarm.driver), axis, effect))
         return rows, list(unexplained.values())
-
-    def some(self, most: int) -> list[ScoredLot]:
-        """At most ``most`` lots, evenly spread over the order of arrival."""
-        return [sensor for sensor, _ in self.source.lots([self.state.order[k] for k in self._spread(most)])]
 
     @cached_property
     def named(self) -> list[Discovery]:
@@ -103,10 +101,23 @@ class Discoveries:
         needed = max(self.state.least_needed(alarm.driver) for alarm in self._of_sensor)
         return self.source.pool.names(self._lots, alarms, needed)
 
+    def some(self, most: int) -> list[tuple[ScoredLot, ScoredLot]]:
+        """At most ``most`` lots, of the sensors and of the station, evenly spread over the order of arrival."""
+        return [*self.source.lots(self.state.order[k] for k in self._spread(most))]
+
+    @cached_property
+    def _both(self) -> list[tuple[ScoredLot, ScoredLot]]:
+        return self.some(MOST_NAMED)
+
     @cached_property
     def _lots(self) -> list[ScoredLot]:
         """The lots used for naming."""
-        return self.some(MOST_NAMED)
+        return [sensor for sensor, _ in self._both]
+
+    @cached_property
+    def _station_sums(self) -> DriverSums:
+        """Sums of the station's columns by station; those of the evidence are bounded."""
+        return gathered([station for _, station in self._both], [STATION])[STATION]
 
     def _spread(self, most: int) -> Places:
         count = len(self.state.order)
@@ -188,23 +199,55 @@ class Discoveries:
     def _station_row(self, alarm: Alarm) -> DiscoveryRow:
         """The row of an error of the station, which changes the force for all units of a lot."""
         effect, column, _ = self.state.hypotheses[alarm.index]
-        station, at = self.state.station, alarm.index - self.state.sensor.size
-        table, scale = station.levels[STATION], float(station.noise[0][at])
-        information = np.maximum(table.information[:, at], 1e-300)
-        values, errors = table.score[:, at] / information, 1.0 / np.sqrt(information)
-        size, reach = float(np.sqrt(np.mean(values**2))), 2.0 * float((scale * errors).max())
-        of_driver = (self.state.effect_of(a) for a in self._of_station if a.driver == alarm.driver)
+        at = alarm.index - self.state.sensor.size
+        here = [k for k, (name, _) in enumerate(self.state.of_station) if name == effect]
+        unit = self._sizes_of_station(here)
+        common, about, errors = (unit * part for part in self._station_levels(alarm.driver, here))
+        size = float(np.sqrt((common**2).sum() if alarm.driver == MEAN else np.mean((about**2).sum(axis=1))))
+        largest = here.index(at)
+        reach = 2.0 * float(errors[:, largest].max())
+        drops = sorted(
+            (self._explained(a), self.state.effect_of(a)) for a in self._of_station if a.driver == alarm.driver
+        )
+        effects = dict.fromkeys(name for drop, name in reversed(drops) if drop > drops[-1][0] - CLASS_WIDTH)
         because = f"the force is changed equally for all units of a lot (column {column + 1} of {effect})"
         ends = size, max(size - reach, 0.0), size + reach
-        effects = list(dict.fromkeys([effect, *of_driver]))
-        row = self._row(alarm, effects, [alarm.driver], ends, ("station", because), self._log_e(alarm))
+        row = self._row(alarm, [*effects], [alarm.driver], ends, ("station", because), self._log_e(alarm))
         row["kind"] = "slope" if alarm.driver == DATE else row["kind"]
         row["levels"] = [
-            {"level": label, "size_ug": MICRO * float(value), "u_ug": MICRO * float(error) * scale, "units": 0}
-            for label, value, error in zip(table.place, values, errors, strict=True)
+            {"level": label, "size_ug": MICRO * float(value), "u_ug": MICRO * float(error), "units": 0}
+            for label, value, error in zip(
+                self._station_sums.labels, (common + about)[:, largest], errors[:, largest], strict=True
+            )
         ]
         row["next"] = "check the station's references (level, encoders, fixture), see 'tumbleline audit'"
         return row
+
+    def _station_levels(self, driver: str, columns: Sequence[int]) -> tuple[Array, Array, Array]:
+        """Coefficients of columns of the station: common (p,), of each station about it, and standard errors (stations, p)."""
+        sums = self._station_sums
+        score, information = sums.score[:, columns], np.maximum(sums.information[:, columns], 1e-300)
+        several = driver == MEAN or len(score) > 1
+        common = score.sum(axis=0) / information.sum(axis=0) * several
+        return common, score / information - common, 1.0 / np.sqrt(information)
+
+    def _explained(self, alarm: Alarm) -> float:
+        """Reduction of the chi-square of all lots by a column of the station, common to all stations or about their mean."""
+        common, about, errors = self._station_levels(alarm.driver, [alarm.index - self.state.sensor.size])
+        return float(np.sum(((common if alarm.driver == MEAN else about) / errors) ** 2))
+
+    def _sizes_of_station(self, columns: Sequence[int]) -> Array:
+        """Rms over the dwells, g, of columns (p,) of the station with coefficient one, of what the model of a lot leaves of them.
+
+        Their information per unit and axis, beside that of functions of the pose, whose size is known.
+        """
+        here = self.source.pool.everywhere(SHAPE)
+        both = [
+            (sensor.own[:, here].mean(axis=0), station.information[columns] / (AXES * len(sensor.units)))
+            for sensor, station in self._both
+        ]
+        own, of_station = (np.mean(np.array(part), axis=0) for part in zip(*both, strict=True))
+        return np.sqrt(of_station / np.median(over(own, self.source.pool.size[here] ** 2)))
 
     def _thermometer_row(self) -> DiscoveryRow:
         """The row of an error of the thermometer, which every unit shows by its temperature coefficient."""

@@ -197,6 +197,7 @@ class AddedAttributes(TypedDict):
     unknown: Annotated[list[str], "serials or runs that the archive does not have yet"]
     similar: Annotated[dict[str, list[str]], "of the first five unknown ones, those of the archive that are similar"]
     refused: Annotated[list[str], "columns that follow from the result of a calibration, and were not taken"]
+    quantities: Annotated[list[str], "attributes that are judged as numbers or days; the others are labels"]
     file: Annotated[str, "where they are kept, in the archive"]
 
 
@@ -207,6 +208,7 @@ class KnownAttribute(TypedDict):
     of: Annotated[str, "units or runs"]
     known: Annotated[int, "of how many"]
     levels: int
+    judged_as: Annotated[str, "quantity or labels"]
     such_as: str
 
 

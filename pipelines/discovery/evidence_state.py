@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from inertial.arrays import Array, Places, over
-from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence
+from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence, restored, stored
 from inertial.discovery.running_sums import FIRST
 from inertial.discovery.scores import Column
 from inertial.discovery.station_wander import WALK_FROM
@@ -34,8 +34,7 @@ in a hundred had twenty times the noise."""
 _MOST_HELD = 0.2
 """Largest part of an effect's evidence by all its columns that columns and axes which would be held may contribute."""
 
-_LAYOUT = 3  # version of the state file
-_WITHIN = "\x1f"  # joins the names of nested arrays: names of drivers and stations may contain any printable character
+_LAYOUT = 4  # version of the state file
 
 
 class Hypothesis(NamedTuple):
@@ -177,19 +176,16 @@ def numbered(columns: Sequence[Column]) -> Places:
 
 def state_bytes(state: Evidences) -> bytes:
     """The state as the content of a file."""
-    arrays = _flat({"sensor": state.sensor.arrays(), "station": state.station.arrays()})
+    arrays = list[Any]()
+    known = ("sensor", "station", "order", "taken_out", "generations", "night")
     about = {
         "layout": _LAYOUT,
         "columns": [state.columns, state.of_station],
-        "order": state.order,
-        "taken_out": state.taken_out,
-        "generations": state.generations,
         "alarms": [astuple(alarm) for alarm in state.alarms],
-        "night": state.night,
-        "names": list(arrays),
+        "state": {name: stored(getattr(state, name), arrays) for name in known},
     }
     buffer = io.BytesIO()
-    parts = {str(number): value for number, value in enumerate(arrays.values())}
+    parts = {str(number): value for number, value in enumerate(arrays)}
     np.savez(buffer, allow_pickle=False, about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8), **parts)
     return buffer.getvalue()
 
@@ -206,40 +202,13 @@ def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mappi
         return None
     with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
         about = json.loads(loaded["about"].tobytes()) if "about" in loaded else {}
-        arrays = {name: loaded[str(number)] for number, name in enumerate(about.get("names", []))}
-    if about.get("layout") != _LAYOUT or about["columns"] != json.loads(json.dumps(source.columns)):
+        if about.get("layout") != _LAYOUT or about["columns"] != json.loads(json.dumps(source.columns)):
+            return None
+        arrays = [loaded[str(number)] for number in range(len(loaded.files) - 1)]
+    alarms = [Alarm(*alarm) for alarm in about["alarms"]]
+    parts = {name: restored(part, arrays) for name, part in about["state"].items()}
+    state = Evidences(*source.columns, **parts, alarms=alarms)
+    if any(run not in source.store.heads for run in state.order):
         return None
-    if any(run not in source.store.heads for run in about["order"]):
-        return None
-    (sensor, station), parts = source.columns, _nested(arrays)
-    return Evidences(
-        columns=sensor,
-        of_station=station,
-        sensor=Evidence.restored(AXES * len(sensor), parts["sensor"], source.earlier(about["order"]), numbered(sensor)),
-        station=Evidence.restored(len(station), parts["station"]),
-        order=about["order"],
-        taken_out=about["taken_out"],
-        generations=about["generations"],
-        alarms=[Alarm(*alarm) for alarm in about["alarms"]],
-        night=about["night"],
-    )
-
-
-def _flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
-    """The arrays of nested mappings, by joined names."""
-    out: dict[str, Any] = {}
-    for name, value in tree.items():
-        out |= _flat(value, f"{above}{name}{_WITHIN}") if isinstance(value, dict) else {above + name: value}
-    return out
-
-
-def _nested(arrays: Mapping[str, Any]) -> dict[str, Any]:
-    """The nested mappings of :func:`_flat`; without those that were empty."""
-    tree: dict[str, Any] = {}
-    for name, value in arrays.items():
-        *above, last = name.split(_WITHIN)
-        branch = tree
-        for part in above:
-            branch = branch.setdefault(part, {})
-        branch[last] = value
-    return tree
+    state.sensor.earlier = source.earlier(state.order)
+    return state

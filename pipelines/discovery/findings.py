@@ -93,7 +93,7 @@ def _visible(found: Discoveries) -> tuple[list[ReachRow], list[UntoldEffect]]:
     if lots < FIRST:
         return [], []
     some = found.some(_SOME)  # for quantities that are similar in all lots
-    inside = np.mean([lot.own.sum(axis=0) for lot in some], axis=0) * lots
+    inside = np.mean([lot.own.sum(axis=0) for lot, _ in some], axis=0) * lots
     between, within = sensor.noise
     times = np.sqrt(2.0 * (found.state.least_needed() + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
     rows: list[ReachRow] = []
@@ -120,11 +120,9 @@ def _visible(found: Discoveries) -> tuple[list[ReachRow], list[UntoldEffect]]:
 def _drivers(source: DiscoveryArchive, state: Evidences) -> list[DriverRow]:
     judged = list(dict.fromkeys(map(plain, state.sensor.drivers)))
     rows: list[DriverRow] = [{"name": name, "status": "judged"} for name in judged]
-    known = [values for by in (source.attributes.serial, source.attributes.run) for values in by.values()]
     for name in source.attributes.names():
         if name not in judged:
-            levels = {value for values in known if (value := values.get(name))}
-            status = "one level" if len(levels) < 2 else "no unit of a pooled lot has it"
+            status = "one level" if len(set(source.attributes.values(name))) < 2 else "no unit of a pooled lot has it"
             rows.append({"name": name, "status": status})
     return rows
 

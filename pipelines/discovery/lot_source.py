@@ -112,6 +112,11 @@ class DiscoveryArchive:
         """The attributes of units and runs."""
         return known_attributes(self.archive)
 
+    def known_until(self, when: str) -> None:
+        """Judge the next lots by the attributes that were known at a time; empty: by all."""
+        self.attributes = known_attributes(self.archive, when)
+        self.__dict__.pop("_quantities", None)
+
     @cached_property
     def revoked(self) -> set[str]:
         """Runs with a revoked calibration."""
@@ -136,7 +141,12 @@ class DiscoveryArchive:
             if head["device"] == self.device and lots.get(lot, ("", "-"))[1]:
                 lots.pop(lot, None)  # a lot arrives with the run that it counts by
                 lots[lot] = run, head["left_out"]
-        yield from lots.values()
+        first = dict[int, str]()
+        for run, reason in lots.values():
+            prints = () if reason else self.store.heads[run]["prints"]
+            twin = next((first[known] for known in prints if known in first), "")
+            first |= {} if twin else dict.fromkeys(prints, run)
+            yield run, f"its dwells are those of {twin}, which counts" if twin else reason
 
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
@@ -212,8 +222,7 @@ class DiscoveryArchive:
         for name in self.attributes.names():
             if name in {MEAN, STATION, SLOT, UNIT, DATE}:
                 continue
-            every = (by_key.values() for by_key in (self.attributes.serial, self.attributes.run))
-            out[name] = as_numbers([value.get(name, "") for values in every for value in values])
+            out[name] = as_numbers(self.attributes.values(name))
         return out
 
     def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:

@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from itertools import groupby
 from typing import Any
 
+from inertial.discovery.running_sums import FIRST
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
@@ -20,7 +21,7 @@ from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
 
-_VERSION = 2  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
+_VERSION = 3  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
 _GROWN = 1.05  # growth of the number of lots from which on the naming is repeated
 _NOTHING: dict[str, Any] = {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0, "alarms": None}
 
@@ -47,14 +48,11 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
         nights = [files.read_json(path) for path in _listed(folder / "nights") if path.name.endswith(".json")]
         state = stored_state(source, folder, nights)
         if state is None:
-            state = _replayed(source, nights)
+            state = _replayed(source, nights, ())
         gone = [run for run in state.order if run in source.revoked]
         if gone:
-            remaining = [run for run in state.order if run not in source.revoked]
-            grown = grown_by_days(source, Evidences.fresh(source), remaining)
-            grown.taken_out, grown.night = [*state.taken_out, *gone], state.night
-            grown.alarms = [*state.alarms, *state.unknown(grown.alarms)]
-            state = grown
+            night, state = state.night, _replayed(source, nights, gone)
+            state.night = night
         counted = {*state.order, *state.taken_out}
         new = [run for run in source.pooled() if run not in counted and run not in source.revoked]
         if new or gone:
@@ -69,14 +67,19 @@ def _listed(folder: Place) -> list[Place]:
     return sorted(folder.iterdir(), key=lambda path: path.name) if folder.is_dir() else []
 
 
-def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> Evidences:
-    """The evidence, computed again in the order of the ledger; lots without scores or removed later are left out."""
+def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]], gone: Sequence[str]) -> Evidences:
+    """The evidence, computed again in the order of the ledger, with the attributes that were known in each night.
+
+    Lots without scores, those removed later and those that are ``gone`` now are left out.
+    """
     state = Evidences.fresh(source)
-    state.taken_out = [run for night in nights for run in night["taken_out"]]
+    state.taken_out = [*(run for night in nights for run in night["taken_out"]), *gone]
     out = set(state.taken_out)
     for night in nights:
+        source.known_until(night["when"])
         runs = [run for run in night["runs"] if run in source.store.heads and run not in out]
         state = grown_by_days(source, state, runs)
+    source.known_until("")
     # an alarm that was raised remains, even if a run that contributed to it was removed since
     index = {str(hypothesis): at for at, hypothesis in enumerate(state.hypotheses)}
     state.alarms += state.unknown(
@@ -97,7 +100,7 @@ def _write(
     nights: Sequence[Mapping[str, Any]],
 ) -> None:
     """Write the entry of a night, which is never rewritten, and the state as a cache."""
-    data = state_bytes(state)
+    data = state_bytes(state) if len(state.order) >= FIRST else b""  # the first lots wait, and are read again
     entry = {
         "night": state.night,
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -152,8 +155,9 @@ def _found(folder: Place) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(data)
     if found.get("version") == _VERSION:
         return found
-    rows = found["discoveries"]
-    return {**_NOTHING, "discoveries": rows, "ids": max((int(row["id"][1:]) for row in rows), default=0)}
+    rows = [*found["discoveries"], *found.get("unexplained", [])]
+    known = max((int(row["id"][1:]) for row in rows), default=0)
+    return {**_NOTHING, "ids": known, **found, "alarms": None}
 
 
 def remembered(

@@ -28,11 +28,12 @@ from schemas.errors import ArchiveUnusable
 from schemas.units import MICRO
 
 FOLDER = "discovery"
-VERSION = 4
+VERSION = 5
 AXES = 3
 MOST_OPEN = 32  # files whose rows are kept in memory: units measured repeatedly were often measured together
 BATCH = 8  # runs that one process scores at a time
 TEXTS = ("run", "when", "station", "device", "model", "who", "left_out")
+_BY_UNIT = ("units", "slots", "prints")
 _PACKED = ("score", "own", "information", "station_scores", "tempco")
 _STEPS = 63.0  # steps per octave of a unit's share of the information
 _SHARE_STEPS = 58.0  # the same of the share left after elimination of the station's errors, down to one twentieth
@@ -60,7 +61,7 @@ class ScoreStore:
                 derived.warn_of_edits(path)
             if state != derived.SOUND or (read := content_of(data)) is None:
                 continue
-            for row, head in enumerate(read.table.select([*TEXTS, "units", "floor"]).to_pylist()):
+            for row, head in enumerate(read.table.select([*TEXTS, "units", "prints", "floor"]).to_pylist()):
                 # interned, because many of a hundred thousand runs have equal texts
                 head |= {name: sys.intern(head[name]) for name in TEXTS if name not in {"run", "when"}}
                 heads.setdefault(head["run"], head | {"file": path, "row": row})
@@ -119,7 +120,7 @@ def written(runs: Sequence[ScoredRun]) -> bytes:
         if of_run is not None:
             products.setdefault(groups[-1], []).append(of_run)
     columns: dict[str, list[Any]] = {name: [getattr(run, name) for run in runs] for name in TEXTS}
-    columns |= {name: [list(getattr(run, name)) for run in runs] for name in ("units", "slots")}
+    columns |= {name: [list(getattr(run, name)) for run in runs] for name in _BY_UNIT}
     columns |= {"columns": groups, "floor": [0.0 if run.scores is None else run.scores.floor for run in runs]}
     packed = [dict.fromkeys(_PACKED, b"") if run.scores is None else _packed(run.scores) for run in runs]
     columns |= {name: [of_run[name] for of_run in packed] for name in _PACKED}
@@ -163,8 +164,8 @@ def content_of(data: bytes) -> Content | None:
 def run_of(row: Mapping[str, Any], products: Mapping[str, Products]) -> ScoredRun:
     """The run of a row of a file."""
     scores = None if row["left_out"] else _unpacked(row, products[row["columns"]])
-    texts = {name: row[name] for name in TEXTS}
-    return ScoredRun(**texts, units=tuple(row["units"]), slots=tuple(row["slots"]), scores=scores)
+    fields: dict[str, Any] = {name: row[name] for name in TEXTS} | {name: tuple(row[name]) for name in _BY_UNIT}
+    return ScoredRun(**fields, scores=scores)
 
 
 def _packed(scores: LotScores) -> dict[str, bytes]:

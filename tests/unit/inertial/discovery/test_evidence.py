@@ -1,5 +1,6 @@
 """Evidence over lots: silent in noise, one lot cannot speak, what is there is found, a state goes on where it was."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ import pytest
 from long_suites import mostly_slow
 
 from benchmarks.discovery.archives import earlier_in
-from inertial.discovery.evidence import ALL, INSIDE, SLOPE, Evidence, ScoredLot
+from inertial.discovery.evidence import ALL, INSIDE, SLOPE, Evidence, ScoredLot, restored, stored
 from inertial.discovery.running_sums import FIRST, Levels, Scale, Sums
 
 UNITS, COUNT = 6, 9
@@ -93,8 +94,15 @@ def test_an_effect_as_a_whole_is_found_before_its_parts_and_in_noise_is_silent()
     assert log_e[COUNT] > log_e[:COUNT].max() + 3.0
     assert log_e[COUNT + 1] < NEEDED
     assert log_e[:COUNT] == pytest.approx(evidence_of(lots(15, 150, spread)).drivers["mean"].log_e)
-    state = Evidence.restored(COUNT, made.arrays(), columns=columns)
+    state = again_from_json(made)
     assert state.drivers["mean"].log_e == pytest.approx(log_e)
+
+
+def again_from_json(evidence: Evidence) -> Evidence:
+    """An evidence whose state was written and read."""
+    arrays = list[np.ndarray]()
+    plain = json.dumps(stored(evidence, arrays))
+    return restored(json.loads(plain), [array.copy() for array in arrays])
 
 
 def test_stations_share_what_all_axes_show_alike_and_not_an_error_of_their_own(rng: np.random.Generator) -> None:
@@ -170,7 +178,8 @@ def test_a_state_goes_on_where_it_was() -> None:
     for lot in given[:70]:
         first.add(lot)
         order.append(lot)
-    again = Evidence.restored(COUNT, first.arrays(), earlier_in(order))
+    again = again_from_json(first)
+    again.earlier = earlier_in(order)
     for lot in given[70:]:
         again.add(lot)
         order.append(lot)

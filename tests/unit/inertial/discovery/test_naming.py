@@ -8,7 +8,8 @@ import pytest
 from long_suites import mostly_slow
 
 from benchmarks.discovery.archives import ArchiveMaker, Hidden, Result, Setting
-from benchmarks.discovery.lots import WORLDS, bank
+from benchmarks.discovery.lots import FLOOR_UG, WORLDS, bank
+from inertial.discovery.driver_sums import gathered
 from inertial.discovery.evidence import ScoredLot
 from inertial.discovery.naming import Pool
 
@@ -48,10 +49,66 @@ def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) 
     assert effect in name.effects
     assert len(name.effects) <= 4
     assert name.drivers[0] == driver
+    if (
+        driver in {"slot", "radius"} and effect != "creep_after_move"
+    ):  # of unit rms over the levels; its time constant is unknown
+        assert name.size()[0] == pytest.approx(0.3 * FLOOR_UG * 1e-6, rel=0.06)
     factor, error, able = pool().confirmed(result.lots[:20], result.lots[20:], driver, effect)
     assert able == 20
     assert factor == pytest.approx(1.0, abs=max(5.0 * error, 0.2))
     assert float(np.mean(pool().carried(result.lots, driver, effect) > 0.0)) > 0.6
+
+
+def test_the_size_of_an_effect_does_not_depend_on_the_order_of_its_columns() -> None:
+    result, products = archive("cross_coupling", "slot"), maker().products
+    k = len(products.columns)
+    at = pool().places("cross_coupling")
+    order = np.arange(k)
+    order[at] = at[::-1]
+    h = (k * np.arange(3)[:, None] + order).reshape(-1)
+    swapped = replace(
+        products,
+        lot=products.lot[np.ix_(h, h)],
+        inside=products.inside[:, order[:, None], order],
+        size=products.size[h],
+    )
+    lots = [
+        replace(lot, score=lot.score[:, h], own=lot.own[:, h], information=lot.information[h]) for lot in result.lots
+    ]
+    (before,), _ = pool().names(result.lots, result.alarms, NEEDED)
+    (after,), _ = Pool(swapped).names(lots, result.alarms, NEEDED)
+    assert after.size() == pytest.approx(before.size(), rel=1e-6)
+
+
+def test_what_had_no_alarm_is_not_named() -> None:
+    lots = archive("third_order", "wafer").lots
+    assert pool().names(lots, {("wafer", "third_order")}, NEEDED)[0]
+    assert pool().names(lots, {("wafer", "scale_temperature_quadratic")}, NEEDED)[0] == []
+
+
+def test_what_all_stations_have_alike_is_no_difference_of_stations() -> None:
+    lots = archive("scale_asymmetry", "mean").lots
+    assert [name.drivers for name in pool().names(lots, {("mean", "scale_asymmetry")}, NEEDED)[0]] == [("mean",)]
+    assert pool().names(lots, {("station", "scale_asymmetry")}, NEEDED) == ([], [])
+
+
+def about(lot: ScoredLot) -> tuple[np.ndarray, np.ndarray]:
+    """Scores of the units about the mean of the lot, and their information."""
+    return lot.inside[0], lot.own
+
+
+def test_two_levels_have_the_size_about_their_mean_and_leave_nothing() -> None:
+    """Each lot has four units of either supplier: the difference of one from the mean of the lot is half of theirs."""
+    lots = archive("cross_coupling", "slot").lots
+    supplied = [replace(lot, levels={"supplier": ("north", "south") * 4}) for lot in lots]
+    (name, *_), _ = pool().names(supplied, {("supplier", "cross_coupling")}, NEEDED)
+    first = pool().everywhere("cross_coupling")[
+        0::2
+    ]  # the other columns are of products that the hidden effect has not
+    score, own = (sum(part[0::2, first].sum(axis=0) for part in parts) for parts in zip(*map(about, lots), strict=True))
+    assert name.sizes[0] == pytest.approx(score / own * pool().size[first], rel=0.06, abs=0.2e-6)
+    left = pool()._subtracted(supplied, "supplier", "cross_coupling")[0]
+    assert pool().score(gathered(left, ["supplier"])["supplier"], "cross_coupling") < 0.01 * name.score
 
 
 def test_an_effect_of_units_measured_again_is_named_by_them() -> None:

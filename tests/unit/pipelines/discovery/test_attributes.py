@@ -8,7 +8,7 @@ from each import each
 
 from pipelines.archive import Archive
 from pipelines.archive.attributes import known_attributes
-from pipelines.discovery.attributes import add_attributes, added_from, as_numbers, sentences
+from pipelines.discovery.attributes import add_attributes, added_from, as_numbers, listed, sentences
 from schemas.errors import WrongUse
 
 
@@ -66,6 +66,7 @@ REFUSED = {
     "serial,grade A1,pass": "grade follow from the result",
     "serial,wafer ,W1": "a row without serial",
     "serial,wafer A1,W1 A1,W2": "two values of wafer for A1 (W1, W2)",
+    "serial,assembled A1,2026-02-28 A2,2026-02-30": "2026-02-30 as assembled of A2, which no calendar has",
     "serial,wafer,wafer A1,W1,W2": "two columns 'wafer', names must differ",
 }
 
@@ -98,3 +99,24 @@ def test_numbers_are_quantities_where_they_have_fractions_or_are_dates() -> None
     assert dates is not None
     assert dates["2026-03-04"] - dates["2026-03-01"] == 3.0
     assert as_numbers(["W1", "0.5"]) is None
+    assert (
+        as_numbers(["2026-02-28", "2026-02-30"]) is None
+    )  # a file of an earlier version may have a day that does not exist
+
+
+def test_a_decimal_comma_is_read_where_commas_do_not_divide(archive: Archive, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("serial;radius\nA1;3,25\nA2;-4,5\nA3;1,2,3\n", encoding="utf-8")
+    added_from(archive, tmp_path / "a.csv", "serial")
+    known = known_attributes(archive)
+    assert [known.of(unit, "r", "radius") for unit in ("A1", "A2", "A3")] == ["3.25", "-4.5", "1,2,3"]
+
+
+def test_how_a_column_is_judged_is_said(archive: Archive) -> None:
+    added = add_attributes(archive, table("serial,wafer,radius,tested A1,W1,1.5,2026-03-01"), "serial", "a.csv")
+    assert added["quantities"] == ["radius", "tested"]
+    assert "quantities: radius, tested; labels: wafer" in sentences(added)
+    added = add_attributes(archive, table("serial,radius A4,n/a"), "serial", "b.csv")
+    assert added["quantities"] == []
+    assert "labels: radius" in sentences(added)
+    judged = {row["attribute"]: row["judged_as"] for row in listed(archive)["attributes"]}
+    assert judged == {"wafer": "labels", "radius": "labels", "tested": "quantity"}

@@ -13,9 +13,10 @@ import pandas as pd
 import pytest
 from demonstrations import wafer_line
 
+from inertial.frames import to_fixture
 from pipelines.archive import Archive, derived, files
 from pipelines.audit.calibrations import Calibrations
-from pipelines.demo.archive_lots import Line, write_lots
+from pipelines.demo.archive_lots import STATIONS, Line, write_lots, write_run
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.discoveries import Discoveries
@@ -73,6 +74,52 @@ def test_scores_on_disk_are_few_bytes_and_nearly_those_of_the_dwells(archive: Ar
     assert after.scores is not None
     assert after.scores.score == pytest.approx(before.scores.score, rel=1e-12)  # the same bytes from the same dwells
     assert after.units == before.units
+
+
+def test_the_same_dwells_in_another_run_count_once(tmp_path: Path) -> None:
+    """A file that is imported again from another format is another run; its noise would confirm itself."""
+    archive, line = Archive(str(tmp_path / "archive")), Line(5, units=2)
+    archive.prepare()
+    dwells, about = line.lot("line-1")
+    for number, taken in enumerate((dwells, dwells, dwells[dwells["unit"] == about["unit"][1]])):
+        write_run(archive, number, "line-1", taken, about[about["unit"].isin(taken["unit"])])
+    source = DiscoveryArchive(archive)
+    source.score(1)
+    first, *others = source.store.heads
+    assert source.pooled() == [first]
+    assert source.left_out() == [(run, f"its dwells are those of {first}, which counts") for run in others]
+
+
+def test_the_size_of_an_error_of_a_station_is_what_the_models_of_its_lots_leave(tmp_path: Path) -> None:
+    archive, line = Archive(str(tmp_path / "archive")), Line(5, units=2)
+    archive.prepare()
+    dwells, leaning = pd.DataFrame(), np.zeros((0, 3))
+    for number in range(66):
+        dwells, about = line.lot(STATIONS[number % 3])
+        leaning = to_fixture((200e-6, 0.0, 0.0), *np.radians(dwells[["outer_deg", "inner_deg"]].to_numpy().T))
+        dwells[["out_x", "out_y", "out_z"]] += leaning * (number % 3 == 0)
+        write_run(archive, number, STATIONS[number % 3], dwells, about)
+    columns = np.column_stack([np.ones(len(dwells)), dwells[["force_x", "force_y", "force_z"]]])
+    left = 1e6 * (leaning - columns @ np.linalg.lstsq(columns, leaning, rcond=None)[0])
+    rows = discovered(archive, Look()).document["discoveries"]
+    (row,) = (row for row in rows if "level_error" in row["effects"] and row["driver"] == "station")
+    # about the mean of three stations, of which one leans
+    assert row["size_ug"] == pytest.approx(np.sqrt(np.mean(left**2) * 2.0 / 9.0), rel=0.15)
+
+
+def test_sums_that_are_lost_are_made_again_with_what_was_known_in_each_night(tmp_path: Path) -> None:
+    """An attribute that is added after the lots were judged is no evidence in them, now or after the sums were lost."""
+    made = wafer_line(tmp_path)
+    archive = Archive(str(made.folder))
+    assert discovered(archive, Look()).document["discoveries"] == []
+    (entry,) = nights(archive)
+    night = json.loads(entry.read_bytes())
+    entry.write_bytes(files.json_bytes({**night, "when": "2026-01-01T00:00:00+00:00"}))  # long before the attributes
+    add_attributes(archive, pd.read_csv(made.units, dtype=str), "serial", "units.csv")
+    assert discovered(archive, Look()).document["discoveries"] == []
+    (entry.parent.parent / "state").unlink()
+    assert discovered(archive, Look()).document["discoveries"] == []
+    assert discovered(archive, Look(looking_back=True)).document["discoveries"]
 
 
 def test_a_second_night_adds_an_entry_and_rewrites_none(archive: Archive) -> None:

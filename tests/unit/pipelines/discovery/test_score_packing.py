@@ -23,7 +23,7 @@ def made(run: str, size: float, rng: np.random.Generator) -> ScoredRun:
         own.sum(axis=0) * rng.uniform(0.06, 1.0, 3 * K), np.ones((2, 1)), 40e-6 * rng.standard_normal((UNITS, 3)), 1e-5,
     )  # fmt: skip
     head = run, "2026-03-02T10:00:00+00:00", "line-1", "DEMO", "bias,scale", "", ""
-    return ScoredRun(*head, tuple("abcd"), tuple("1234"), scores)
+    return ScoredRun(*head, tuple("abcd"), tuple("1234"), (2**62, -5, 0, 7), scores)
 
 
 @pytest.mark.parametrize("size", [1.0, 30.0, 1e5])
@@ -44,7 +44,7 @@ def test_scores_keep_a_thirtieth_of_their_standard_deviation_and_information_a_h
         assert after.own == pytest.approx(before.own, rel=0.01)
         assert after.information == pytest.approx(before.information, rel=0.012)
         assert after.tempco == pytest.approx(before.tempco, rel=1e-3)
-        assert (again.units, after.products.columns) == (run.units, before.products.columns)
+        assert (again.units, again.prints, after.products.columns) == (run.units, run.prints, before.products.columns)
         assert (after.products.station, after.products.lots) == (before.products.station, len(runs))
 
 
