@@ -97,14 +97,10 @@ class DirectionOff(Handling):
     symbol = "Δα, Δβ"
     which: ClassVar[str]
 
-    def errors(self, lot: Lot) -> Array:
-        """Columns (units or 1, n, 3, k), g per unit of the coefficient, of the errors in each dwell."""
-        return pose_errors(lot.state)
-
     def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
-        """The errors in the dwells."""
+        """The two errors in the dwells."""
         here = np.isin(np.arange(lot.state.time.shape[1]), self.dwells(lot, **location))
-        return self.errors(lot) * here[:, None, None]
+        return pose_errors(lot.state) * here[:, None, None]
 
     def describe(self, lot: Lot, size: Array, **location: float) -> str:
         """The two angles of a table; of stated forces the angle between the two directions."""

@@ -18,7 +18,7 @@ class WrongPose(DirectionOff, OfOneDwell):
         return [{"at": float(k)} for k in np.flatnonzero(lot.measured)] if pose_errors(lot.state).shape[-1] else []
 
     def every_dwell(self, lot: Lot) -> Array:
-        return self.errors(lot)
+        return pose_errors(lot.state)
 
     def dwells(self, lot: Lot, **location: float) -> list[int]:
         return [int(location["at"])]

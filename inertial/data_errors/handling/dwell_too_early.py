@@ -1,0 +1,37 @@
+import numpy as np
+
+from inertial.estimation.alternative import Array, OfOneDwell, common_force, without
+from inertial.estimation.lot import Lot
+
+
+class DwellTooEarly(OfOneDwell):
+    """A dwell that began before the table stood, for all units: its mean holds a share of the pose before."""
+
+    id = "dwell_too_early"
+    symbol = "q"
+    equation = "q·(f_before − f) in one dwell"
+    breaker = "measure that pose again, after a longer wait"
+
+    def locations(self, lot: Lot) -> list[dict[str, float]]:
+        """Every dwell after another one."""
+        return [{"at": float(k)} for k in np.flatnonzero(lot.measured[1:] & lot.measured[:-1]) + 1]
+
+    def every_dwell(self, lot: Lot) -> Array:
+        force = common_force(lot)
+        return (np.roll(force, 1, axis=1) - force)[..., None]
+
+    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
+        here = np.arange(lot.state.time.shape[1]) == int(location["at"])
+        return self.every_dwell(lot) * here[:, None, None]
+
+    def possible(self, size: Array) -> bool:
+        return bool(0.0 < size[0] < 1.0)
+
+    def describe(self, lot: Lot, size: Array, **location: float) -> str:
+        return f"the dwell holds {100.0 * float(size[0]):.2g} % of the pose before, for all units; the dwell is left out"
+
+    def mended(self, lot: Lot, size: Array, **location: float) -> Lot | None:
+        return without(lot, self.dwells(lot, **location))
+
+    def dwells(self, lot: Lot, **location: float) -> list[int]:
+        return [int(location["at"])]
