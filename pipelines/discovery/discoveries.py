@@ -14,7 +14,7 @@ from inertial.discovery.naming import Name, Unnamed
 from inertial.discovery.pose_shape import SHAPE, angles_of, map_of
 from inertial.discovery.running_sums import Sums
 from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow, Scope, UnexplainedRow
-from pipelines.discovery.evidence_state import Alarm, Evidences
+from pipelines.discovery.evidence_state import ALPHA, Alarm, Evidences
 from pipelines.discovery.lot_source import OWN_TEMPCO, SEASON, DiscoveryArchive
 from pipelines.discovery.score_store import AXES
 from schemas.units import MICRO
@@ -284,9 +284,12 @@ class Discoveries:
             )
         if driver not in {MEAN, DATE, SEASON}:
             return "sensor", "lots of other stations predict it, which excludes wander of a single station"
-        if self.state.sensor.shared_by_stations()[self.source.pool.everywhere(found.name.effects[0])].any():
-            return "sensor", f"all {stations} stations show it, and they differ by less than it"
-        return "sensor_or_station", f"{stations} stations are too few to exclude permanent errors of their references"
+        here = self.source.pool.everywhere(found.name.effects[0])
+        # an error of one reference is in several columns and axes at once, so that they are no further evidence
+        by_chance = self.state.sensor.alike_by_chance()[here].min() * here.size * len(self.source.pool.effects)
+        if driver == MEAN and by_chance < ALPHA:
+            return "sensor", f"{stations} stations agree better than references that differ at random between them"
+        return "sensor_or_station", f"the references of {stations} stations can be alike in it by chance"
 
     def _unexplained_row(self, driver: str, axis: str, nearest: str) -> UnexplainedRow:
         """The row of a difference by a driver that no effect explains, without a map."""
@@ -358,7 +361,8 @@ def _next_of(driver: str, scope: Scope) -> str:
     """The next action: a measurement, or a change of the model."""
     if scope == "sensor_or_station":
         return (
-            "measure some of the same units on another station: an effect that stays with the units is of the sensors"
+            "measure some units again, turned by 180° in their seats, and on another station: "
+            "an effect that stays with the units is of the sensors"
         )
     if driver == SLOT:
         return "exchange units between slots, or check the fixture at this slot"
