@@ -62,6 +62,12 @@ class Sums:
         return out
 
 
+def growth_of(contributions: Array) -> Array:
+    """Logarithm of the one-sided evidence of contributions (n,) after each of them, in units of their root mean square."""
+    x = contributions / (float(np.sqrt(np.mean(contributions**2))) or 1.0)
+    return Sums(np.cumsum(x), np.cumsum(x**2), two_sided=False).log_e
+
+
 class Levels:
     """Sums over earlier lots of the scores and of the information of every level of a driver, (levels, h) each."""
 

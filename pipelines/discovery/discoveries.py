@@ -11,8 +11,9 @@ from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import DriverSums, gathered
 from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
 from inertial.discovery.naming import Name, Unnamed
-from inertial.discovery.pose_shape import SHAPE, angles_of, map_of
-from inertial.discovery.running_sums import Sums
+from inertial.discovery.pose_shape import SHAPE, map_of
+from inertial.discovery.running_sums import growth_of
+from inertial.frames import angles_from_force
 from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow, Scope, UnexplainedRow
 from pipelines.discovery.evidence_state import ALPHA, Alarm, Evidences
 from pipelines.discovery.lot_source import OWN_TEMPCO, SEASON, DiscoveryArchive
@@ -33,6 +34,14 @@ _BY_DRIVER: dict[str, tuple[Scope, str]] = {
     UNIT: ("sensor", "the same unit shows it again in later lots, compared with the other units of each lot"),
 }
 """Scope of a discovery that follows from its driver alone, and the reason."""
+_NEXT: dict[str, str] = {
+    STATION: "measure the same units on two of these stations, and check their references",
+    SLOT: "exchange units between slots, or check the fixture at this slot",
+    "sensor_or_station": "measure some units again, turned by 180° in their seats, and on another station: "
+    "an effect that stays with the units is of the sensors",
+}
+_IN_MODEL = "add the effect to the model of the next lots: 'tumbleline extend', then 'tumbleline discover --model'"
+"""The next action by driver or scope, a measurement; else a change of the model."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +180,7 @@ class Discoveries:
             "levels": [],
             "carried_by": {"lots_for": None, "log_e_without_largest_2_percent": None},
             "confirmed": None,
-            "next": _next_of(drivers[0], scope[0]),
+            "next": _NEXT.get(scope[0]) or _NEXT.get(drivers[0], _IN_MODEL),
         }
 
     def _named_row(self, found: Discovery) -> DiscoveryRow:
@@ -314,7 +323,8 @@ class Discoveries:
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
         row = self._unexplained_row(unnamed.driver, "xyz"[best], self._nearest(unnamed.driver))
         row["level"] = unnamed.level
-        row["map"] = np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist()
+        angles = np.degrees(np.column_stack(angles_from_force(force)))
+        row["map"] = np.column_stack([angles, MICRO * np.column_stack(maps[best])]).tolist()
         return row
 
     def _nearest(self, driver: str) -> str:
@@ -353,19 +363,4 @@ def _levels_of(name: Name) -> list[DiscoveredLevel]:
 def _without_largest(carried: Array) -> float:
     """Log evidence of the lots' contributions without the largest two per cent."""
     rest = np.sort(carried)[: max(1, int(0.98 * carried.size))]
-    x = rest / (float(np.sqrt(np.mean(rest**2))) or 1.0)
-    return float(Sums(np.array([x.sum()]), np.array([(x**2).sum()]), two_sided=False).log_e[0])
-
-
-def _next_of(driver: str, scope: Scope) -> str:
-    """The next action: a measurement, or a change of the model."""
-    if scope == "sensor_or_station":
-        return (
-            "measure some units again, turned by 180° in their seats, and on another station: "
-            "an effect that stays with the units is of the sensors"
-        )
-    if driver == SLOT:
-        return "exchange units between slots, or check the fixture at this slot"
-    if driver == STATION:
-        return "measure the same units on two of these stations, and check their references"
-    return "add the effect to the model of the next lots: 'tumbleline extend', then 'tumbleline discover --model'"
+    return float(growth_of(rest)[-1])
