@@ -99,14 +99,13 @@ class Unnamed:
     """A dependence on pose that differs by a driver and that no named effect explains.
 
     level : level of the driver with the largest dependence, "" if it has none · size : (axes, p), g, of the free functions
-    covariance : (axes, p, p), g², of the sizes · score : score over all levels
+    covariance : (axes, p, p), g², of the sizes
     """
 
     driver: str
     level: str
     size: Array
     covariance: Array
-    score: float
 
 
 class Pool:
@@ -172,7 +171,7 @@ class Pool:
             best = max((pair for pair in significant if pair[1] == SHAPE), key=lambda pair: scores[pair], default=None)
             if best is None or scores[best] <= least or best[0] in {unnamed.driver for unnamed in out}:
                 break
-            out.append(self._shape(sums[best[0]], scores[best]))
+            out.append(self._shape(sums[best[0]]))
             least = max(least, _REMAINDER * scores[best])
             lots, *_ = self._subtracted(lots, *best)
         return out
@@ -199,13 +198,13 @@ class Pool:
         ]
         return sums, scores, significant
 
-    def _shape(self, sums: DriverSums, score: float) -> Unnamed:
+    def _shape(self, sums: DriverSums) -> Unnamed:
         """The dependence on pose of the level with the largest one."""
         size, products = self._fitted(sums, SHAPE)
         z = size / np.sqrt(np.maximum(np.diagonal(products, axis1=2, axis2=3), 1e-300))
         level = int(np.argmax(np.sum(z**2, axis=(0, 2))))
         label = sums.labels[level] if len(sums.labels) > 1 else ""
-        return Unnamed(sums.driver, label, size[:, level], products[:, level], score)
+        return Unnamed(sums.driver, label, size[:, level], products[:, level])
 
     def _fitted(self, sums: DriverSums, effect: str) -> tuple[Array, Array]:
         """Sizes (axes, levels, p) of an effect's columns, fitted jointly per level, and covariances (axes, levels, p, p)."""

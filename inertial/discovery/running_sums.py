@@ -1,8 +1,4 @@
-"""Running sums over the lots so far: the evidence of a driver, the sizes of its levels, the scale of the increments.
-
-Each increment x is, given all earlier lots, symmetric about zero under the null hypothesis. Then exp(λS − λ²V/2) with S = Σx and
-V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004).
-"""
+"""Running sums over the lots so far: the evidence of a driver, the sizes of its levels, the scale of the increments."""
 
 from dataclasses import dataclass
 

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from inertial.arrays import Array, Places, over
+from inertial.counts import number_of
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import DriverSums, gathered
 from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
@@ -286,19 +287,14 @@ class Discoveries:
             return _BY_DRIVER[driver]
         if any(a.driver == driver + INSIDE for a in self._of_sensor):
             return "sensor", "units of one lot differ by it; errors of the station are common to a lot and cancel"
-        if stations < 2:
-            return (
-                "sensor_or_station",
-                "with one station, permanent errors or wander of its references cannot be excluded",
-            )
-        if driver not in {MEAN, DATE, SEASON}:
+        if stations > 1 and driver not in {MEAN, DATE, SEASON}:
             return "sensor", "lots of other stations predict it, which excludes wander of a single station"
         here = self.source.pool.everywhere(found.name.effects[0])
         # an error of one reference is in several columns and axes at once, so that they are no further evidence
         by_chance = self.state.sensor.alike_by_chance()[here].min() * here.size * len(self.source.pool.effects)
         if driver == MEAN and by_chance < ALPHA:
             return "sensor", f"{stations} stations agree better than references that differ at random between them"
-        return "sensor_or_station", f"the references of {stations} stations can be alike in it by chance"
+        return "sensor_or_station", f"the references of {number_of(stations, 'station')} may be the cause"
 
     def _unexplained_row(self, driver: str, axis: str, nearest: str) -> UnexplainedRow:
         """The row of a difference by a driver that no effect explains, without a map."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from datetime import datetime
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -165,7 +165,7 @@ class DiscoveryArchive:
 
     def lot_of(self, run: ScoredRun) -> ScoredLot:
         """A run as a lot, in the order of the archive's hypotheses."""
-        scores, k = _scores_of(run), len(self.columns[0])
+        scores, k = cast("LotScores", run.scores), len(self.columns[0])  # only runs with scores are pooled
         at = indices(self.columns[0], scores.products.columns)
 
         def spread(values: Array) -> Array:
@@ -179,7 +179,7 @@ class DiscoveryArchive:
         return self.change(ScoredLot(run.run, run.station, _day(run.when), run.units, *every, levels, numbers, slopes))
 
     def _of_station(self, run: ScoredRun) -> ScoredLot:
-        scores, sums = _scores_of(run), np.zeros((2, len(self.columns[1])))
+        scores, sums = cast("LotScores", run.scores), np.zeros((2, len(self.columns[1])))
         sums[:, indices(self.columns[1], scores.products.station)] = scores.of_station
         score, information = sums
         return ScoredLot(run.run, run.station, _day(run.when), ("",), score[None], information[None], information)
@@ -208,12 +208,8 @@ class DiscoveryArchive:
     @cached_property
     def _quantities(self) -> dict[str, dict[str, float] | None]:
         """For each attribute that is a driver its numbers; None for labels."""
-        out: dict[str, dict[str, float] | None] = {}
-        for name in self.attributes.names():
-            if name in {MEAN, STATION, SLOT, UNIT, DATE}:
-                continue
-            out[name] = as_numbers(self.attributes.values(name))
-        return out
+        names = (name for name in self.attributes.names() if name not in {MEAN, STATION, SLOT, UNIT, DATE})
+        return {name: as_numbers(self.attributes.values(name)) for name in names}
 
     def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:
         """A function of unit and n: score and information (h,) of the unit within the first n lots; None if unmeasured.
@@ -252,9 +248,3 @@ class DiscoveryArchive:
 
 def _day(when: str) -> float:
     return datetime.fromisoformat(when).timestamp() / 86400.0
-
-
-def _scores_of(run: ScoredRun) -> LotScores:
-    if run.scores is None:
-        raise LookupError(run.run)
-    return run.scores

@@ -38,6 +38,11 @@ def scope_text(row: DiscoveryRow) -> str:
     return text
 
 
+def texts_of(row: DiscoveryRow | UnexplainedRow) -> list[str]:
+    """All sentences on a discovery or an unexplained dependence."""
+    return [unexplained_text(row)] if "nearest" in row else [headline(row), scope_text(row), *support_text(row)]
+
+
 def support_text(row: DiscoveryRow) -> list[str]:
     """How many lots carry a discovery, and whether later ones confirm it; nothing for errors of the references."""
     carried = row["carried_by"]
