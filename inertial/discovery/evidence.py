@@ -134,10 +134,8 @@ class Evidence:
 
     @property
     def noise(self) -> tuple[Array, Array]:
-        """Standard deviations (h,) over the stated ones, of lots about their stations and of units within lots; 1 at first."""
-        stated = np.ones(self.count)
-        both = (self._scales[name].rms if name in self._scales else stated for name in ("between", "inside"))
-        return next(both), next(both)
+        """Standard deviations (h,) over the stated ones, of lots about their stations and of units within lots."""
+        return self._scales["between"].rms, self._scales["inside"].rms
 
     def shared_by_stations(self) -> Flags:
         """Whether each mean (h,) is common to the stations, not an error that differs between them.
@@ -163,9 +161,9 @@ class Evidence:
 
         Zero with fewer than two stations, or where one has not measured it.
         """
-        table = self.levels.get(STATION)
-        if table is None or len(self.wander.stations) < 2 or "between" not in self._scales:
+        if len(self.wander.stations) < 2:
             return np.zeros(self.count)
+        table = self.levels[STATION]
         seen, size = table.information > 0.0, over(table.score, table.information)
         noise = self._scales["between"].rms ** 2 * np.mean(1.0 / np.where(seen, table.information, 1.0), axis=0)
         return np.where(seen.all(axis=0), size.mean(axis=0) ** 2 / np.maximum(size.var(axis=0), noise), 0.0)
