@@ -7,7 +7,6 @@ is subtracted from all sums by the products of the columns, and the remainder is
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -109,11 +108,15 @@ class Unnamed:
 
 
 class Pool:
-    """All lots of an archive, gathered for some drivers; hypotheses are axes × columns."""
+    """All lots of an archive, gathered for some drivers; hypotheses are axes × columns, effects in the order of columns."""
 
     def __init__(self, products: Products) -> None:
         self.columns, self.size, self.axes = products.columns, products.size, len(products.inside)
         self.lot, self.inside = correlations_of(products.lot), correlations_of(products.inside)
+        self.effects = list(dict.fromkeys(effect for effect, _ in self.columns))
+        # indicator (h, effects), 1 where a hypothesis belongs to an effect
+        belongs = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
+        self._sum_over = np.tile(belongs, (self.axes, 1))
 
     def names(
         self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float
@@ -307,17 +310,6 @@ class Pool:
         common = lot.averaged(of_units)
         inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
         return inside if sums.inside_only else inside + common**2 * lot.information
-
-    @cached_property
-    def effects(self) -> list[str]:
-        """Ids of the effects, in the order of their columns."""
-        return list(dict.fromkeys(effect for effect, _ in self.columns))
-
-    @cached_property
-    def _sum_over(self) -> Array:
-        """Indicator (h, effects), 1 where a hypothesis belongs to an effect."""
-        belongs = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
-        return np.tile(belongs, (self.axes, 1))
 
     def without(self, lot: ScoredLot, sums: DriverSums, effect: str, sizes: Array) -> ScoredLot:
         """A lot with an effect of sizes (axes, levels, p) subtracted from its sums; no dwell is read again."""

@@ -4,7 +4,7 @@ import io
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -50,7 +50,8 @@ class Hypothesis(NamedTuple):
         return f"{self.effect}.{self.column}" + (f".{self.axis}" if self.axis else "")
 
 
-class Alarm(NamedTuple):
+@dataclass(frozen=True)
+class Alarm:
     """Evidence beyond the threshold: driver, index of the hypothesis, first night, number of lots then, log evidence then."""
 
     driver: str
@@ -180,7 +181,7 @@ def state_bytes(state: Evidences) -> bytes:
     about = {
         "layout": _LAYOUT,
         "columns": [state.columns, state.of_station],
-        "alarms": state.alarms,
+        "alarms": [astuple(alarm) for alarm in state.alarms],
         "state": {name: stored(getattr(state, name), arrays) for name in known},
     }
     buffer = io.BytesIO()

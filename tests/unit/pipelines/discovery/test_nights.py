@@ -3,6 +3,7 @@
 import json
 import logging
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -321,7 +322,7 @@ def test_shares_of_hypotheses_add_up_to_the_probability_of_an_error_and_an_effec
             patch.setattr(type(sensor), "shared_by_stations", lambda _, flags=shared: flags)
             patch.setattr(type(sensor), "guarded", np.zeros(sensor.count, dtype=bool))
             assert state.held(alarm) is is_held
-            assert state.held(alarm._replace(index=int(axes[1])))
+            assert state.held(replace(alarm, index=int(axes[1])))
 
 
 def test_errors_that_references_of_stations_have_alike_by_chance_are_not_said_to_be_of_the_sensors(
