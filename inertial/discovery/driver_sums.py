@@ -15,6 +15,7 @@ class DriverSums(Levels):
     """Sums of a driver by level, in units of the noise of the lots; the level of a number is its slope.
 
     units : number of units of each level · about : origin from which a number is counted
+    inside_only : whether the driver is judged only by differences within lots
     inside, between : information from differences within lots, and from the means of lots
     spread : rms of the numbers over the units, about the origin; 1 for labels
     """
@@ -22,6 +23,7 @@ class DriverSums(Levels):
     def __init__(self, driver: str, lots: Sequence[ScoredLot]) -> None:
         super().__init__(lots[0].information.size)
         self.driver, self.units, self.inside, self.between = driver, Counter[str](), 0.0, 0.0
+        self.inside_only = driver in {SLOT, UNIT}
         means = [float(numbers.mean()) for lot in lots if (numbers := lot.number(driver)) is not None]
         self.about, self.spread = float(np.nanmean(means)) if means else 0.0, 1.0
         self._squares = np.zeros(2)  # of the numbers about the origin: their number and sum
@@ -31,11 +33,6 @@ class DriverSums(Levels):
     def labels(self) -> list[str]:
         """Names of the g levels."""
         return list(self.place)
-
-    @property
-    def inside_only(self) -> bool:
-        """Whether the driver is judged only by differences within a lot."""
-        return self.driver in {SLOT, UNIT}
 
     @property
     def mixed(self) -> bool:

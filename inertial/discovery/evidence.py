@@ -27,7 +27,7 @@ INSIDE = ", inside lots"
 """Suffix of the name of a driver that is judged by differences within a lot, in which common errors cancel."""
 
 SHARED: float = float(np.log(300.0))
-"""Log odds from which on a mean is attributed to the sensors, not to the stations' references."""
+"""Log odds from which on a mean is common to the stations, not an error that differs between their references."""
 
 _SHARED_ON_AXES, _SHARED_ON_ONE = 0.005, 0.1
 """Limits of the probability that references differing at random between stations agree as well, on all axes of a column together
@@ -134,30 +134,39 @@ class Evidence:
 
     @property
     def noise(self) -> tuple[Array, Array]:
-        """Standard deviations (h,) over the stated ones, of lots about their stations and of units within lots; 1 at first."""
-        stated = np.ones(self.count)
-        both = (self._scales[name].rms if name in self._scales else stated for name in ("between", "inside"))
-        return next(both), next(both)
+        """Standard deviations (h,) over the stated ones, of lots about their stations and of units within lots."""
+        return self._scales["between"].rms, self._scales["inside"].rms
 
     def shared_by_stations(self) -> Flags:
-        """Whether each mean (h,) is common to the stations, not due to permanent errors of their references.
+        """Whether each mean (h,) is common to the stations, not an error that differs between them.
 
         Stations scattered about a common mean are compared with stations scattered about zero: log odds k/2·ln(1 + mean²/s²) for
         k stations, where s is their scatter, or the noise if that is larger. Odds of three hundred to one on the axis suffice, or
         Student's t of the stations over all axes of a column (Fisher's combination).
         """
-        table, count = self.levels.get(STATION), len(self.wander.stations)
-        if table is None or count < 2 or "between" not in self._scales:
-            return np.zeros(self.count, dtype=bool)
-        n, information = len(table.place), table.information
-        seen, size = information > 0.0, over(table.score, information)
-        noise = self._scales["between"].rms ** 2 * np.mean(1.0 / np.where(seen, information, 1.0), axis=0)
-        ratio = size.mean(axis=0) ** 2 / np.maximum(size.var(axis=0), noise)
-        odds = 0.5 * n * np.log1p(ratio)
-        p = np.where(seen.all(axis=0), 2.0 * stdtr(n - 1, -np.sqrt((n - 1) * ratio)), 1.0)
+        ratio, p = self._agreement, self.alike_by_chance()
+        odds = 0.5 * len(self.wander.stations) * np.log1p(ratio)
         fisher = -2.0 * np.log(np.maximum(p, 1e-300)).reshape(self.axes, -1).sum(axis=0)
         on_axes = np.tile(chdtrc(2.0 * self.axes, fisher) < _SHARED_ON_AXES, self.axes)
-        return seen.all(axis=0) & ((odds > SHARED) | (on_axes & (p < _SHARED_ON_ONE)))
+        return (odds > SHARED) | (on_axes & (p < _SHARED_ON_ONE))
+
+    def alike_by_chance(self) -> Array:
+        """Probability (h,) that references that differ at random between k stations agree as well, by Student's t."""
+        freedoms = max(len(self.wander.stations) - 1, 1)
+        return 2.0 * stdtr(freedoms, -np.sqrt(freedoms * self._agreement))
+
+    @property
+    def _agreement(self) -> Array:
+        """Square of the mean of the stations over their variance, or that of the noise if larger, (h,).
+
+        Zero with fewer than two stations, or where one has not measured it.
+        """
+        if len(self.wander.stations) < 2:
+            return np.zeros(self.count)
+        table = self.levels[STATION]
+        seen, size = table.information > 0.0, over(table.score, table.information)
+        noise = self._scales["between"].rms ** 2 * np.mean(1.0 / np.where(seen, table.information, 1.0), axis=0)
+        return np.where(seen.all(axis=0), size.mean(axis=0) ** 2 / np.maximum(size.var(axis=0), noise), 0.0)
 
     def _begin(self) -> None:
         """Initialise the scales from medians of the first lots, then add these lots in their order."""

@@ -7,7 +7,6 @@ is subtracted from all sums by the products of the columns, and the remainder is
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -99,22 +98,25 @@ class Unnamed:
     """A dependence on pose that differs by a driver and that no named effect explains.
 
     level : level of the driver with the largest dependence, "" if it has none · size : (axes, p), g, of the free functions
-    covariance : (axes, p, p), g², of the sizes · score : score over all levels
+    covariance : (axes, p, p), g², of the sizes
     """
 
     driver: str
     level: str
     size: Array
     covariance: Array
-    score: float
 
 
 class Pool:
-    """All lots of an archive, gathered for some drivers; hypotheses are axes × columns."""
+    """All lots of an archive, gathered for some drivers; hypotheses are axes × columns, effects in the order of columns."""
 
     def __init__(self, products: Products) -> None:
         self.columns, self.size, self.axes = products.columns, products.size, len(products.inside)
         self.lot, self.inside = correlations_of(products.lot), correlations_of(products.inside)
+        self.effects = list(dict.fromkeys(effect for effect, _ in self.columns))
+        # indicator (h, effects), 1 where a hypothesis belongs to an effect
+        belongs = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
+        self._sum_over = np.tile(belongs, (self.axes, 1))
 
     def names(
         self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float
@@ -172,7 +174,7 @@ class Pool:
             best = max((pair for pair in significant if pair[1] == SHAPE), key=lambda pair: scores[pair], default=None)
             if best is None or scores[best] <= least or best[0] in {unnamed.driver for unnamed in out}:
                 break
-            out.append(self._shape(sums[best[0]], scores[best]))
+            out.append(self._shape(sums[best[0]]))
             least = max(least, _REMAINDER * scores[best])
             lots, *_ = self._subtracted(lots, *best)
         return out
@@ -199,13 +201,13 @@ class Pool:
         ]
         return sums, scores, significant
 
-    def _shape(self, sums: DriverSums, score: float) -> Unnamed:
+    def _shape(self, sums: DriverSums) -> Unnamed:
         """The dependence on pose of the level with the largest one."""
         size, products = self._fitted(sums, SHAPE)
         z = size / np.sqrt(np.maximum(np.diagonal(products, axis1=2, axis2=3), 1e-300))
         level = int(np.argmax(np.sum(z**2, axis=(0, 2))))
         label = sums.labels[level] if len(sums.labels) > 1 else ""
-        return Unnamed(sums.driver, label, size[:, level], products[:, level], score)
+        return Unnamed(sums.driver, label, size[:, level], products[:, level])
 
     def _fitted(self, sums: DriverSums, effect: str) -> tuple[Array, Array]:
         """Sizes (axes, levels, p) of an effect's columns, fitted jointly per level, and covariances (axes, levels, p, p)."""
@@ -308,17 +310,6 @@ class Pool:
         common = lot.averaged(of_units)
         inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
         return inside if sums.inside_only else inside + common**2 * lot.information
-
-    @cached_property
-    def effects(self) -> list[str]:
-        """Ids of the effects, in the order of their columns."""
-        return list(dict.fromkeys(effect for effect, _ in self.columns))
-
-    @cached_property
-    def _sum_over(self) -> Array:
-        """Indicator (h, effects), 1 where a hypothesis belongs to an effect."""
-        belongs = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
-        return np.tile(belongs, (self.axes, 1))
 
     def without(self, lot: ScoredLot, sums: DriverSums, effect: str, sizes: Array) -> ScoredLot:
         """A lot with an effect of sizes (axes, levels, p) subtracted from its sums; no dwell is read again."""

@@ -29,12 +29,6 @@ def harmonics(force: Array) -> Array:
     return np.stack(out, axis=-1) * (size > 0.0)[..., None]
 
 
-def angles_of(force: Array) -> Array:
-    """Outer and inner angle (n, 2), degrees, at which a table with a level outer axis has the directions of forces (n, 3)."""
-    x, y, z = np.moveaxis(force / np.linalg.norm(force, axis=-1, keepdims=True), -1, 0)
-    return np.degrees(np.column_stack([np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(x, y)]))
-
-
 def map_of(force: Array, size: Array, covariance: Array) -> tuple[Array, Array]:
     """A free function at poses after a fit of bias and linear response, and its standard errors, (n,) each, unit of ``size``.
 

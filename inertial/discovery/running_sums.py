@@ -1,8 +1,4 @@
-"""Running sums over the lots so far: the evidence of a driver, the sizes of its levels, the scale of the increments.
-
-Each increment x is, given all earlier lots, symmetric about zero under the null hypothesis. Then exp(λS − λ²V/2) with S = Σx and
-V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004).
-"""
+"""Running sums over the lots so far: the evidence of a driver, the sizes of its levels, the scale of the increments."""
 
 from dataclasses import dataclass
 
@@ -60,6 +56,12 @@ class Sums:
             each = -0.5 * np.log(grown) + 0.5 * _MIXED[:, None] * s**2 / grown
             out[single] = logsumexp(each, axis=0) - np.log(_MIXED.size)
         return out
+
+
+def growth_of(contributions: Array) -> Array:
+    """Logarithm of the one-sided evidence of contributions (n,) after each of them, in units of their root mean square."""
+    x = contributions / (float(np.sqrt(np.mean(contributions**2))) or 1.0)
+    return Sums(np.cumsum(x), np.cumsum(x**2), two_sided=False).log_e
 
 
 class Levels:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from inertial import effects as catalogue
-from inertial.arrays import Array, over
+from inertial.arrays import Array, Places, over
 from inertial.criticism.drivers import forces_along
 from inertial.design import starting_values
 from inertial.discovery.pose_shape import COUNT, SHAPE, harmonics
@@ -40,7 +40,7 @@ _RIDGE = 1e-9
 
 @dataclass(frozen=True)
 class Products:
-    """Products of columns of coefficients in g per unit of the effect's column, as means over lots with equal columns.
+    """Products of columns of coefficients in g per unit of the effect's column, as means over lots.
 
     columns : (k,), effect and index of its column, of the sensor; station : (q,), the same of the station
     lot : (h, h), for the h = axes·k sums over the units, errors of the station eliminated, which couples the axes
@@ -57,13 +57,23 @@ class Products:
 
     @classmethod
     def mean(cls, parts: "Sequence[Products]") -> "Products":
-        """Means over all lots of the parts."""
-        lots = [part.lots for part in parts]
-        lot, inside, size = (
-            np.average([getattr(part, name) for part in parts], axis=0, weights=lots)
-            for name in ("lot", "inside", "size")
+        """Means over all lots of the parts, of the columns of any; sizes over the lots that have the column."""
+        columns = tuple(dict.fromkeys(column for part in parts for column in part.columns))
+        station = tuple(dict.fromkeys(column for part in parts for column in part.station))
+        m, k, lots = (
+            max((len(part.inside) for part in parts), default=0),
+            len(columns),
+            sum(part.lots for part in parts),
         )
-        return cls(parts[0].columns, parts[0].station, lot, inside, size, sum(lots))
+        lot, inside, size, weight = np.zeros((m, k, m, k)), np.zeros((m, k, k)), np.zeros((m, k)), np.zeros(k)
+        for part in parts:
+            at = indices(columns, part.columns)
+            lot[np.ix_(np.arange(m), at, np.arange(m), at)] += part.lots * part.lot.reshape(m, at.size, m, at.size)
+            inside[:, at[:, None], at] += part.lots * part.inside
+            size[:, at] += part.lots * part.size.reshape(m, -1)
+            weight[at] += part.lots
+        lot, inside = lot.reshape(m * k, m * k) / max(lots, 1), inside / max(lots, 1)
+        return cls(columns, station, lot, inside, (size / weight).reshape(-1), lots)
 
 
 @dataclass(frozen=True)
@@ -85,6 +95,12 @@ class LotScores:
     of_station: Array
     tempco: Array
     floor: float
+
+
+def indices(columns: Sequence[Column], some: Sequence[Column]) -> Places:
+    """Index of each of some columns among all."""
+    index = {column: at for at, column in enumerate(columns)}
+    return np.array([index[column] for column in some], dtype=np.intp)
 
 
 def correlations_of(products: Array) -> Array:

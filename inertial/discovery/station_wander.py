@@ -11,14 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from inertial.arrays import Array, Flags, over
+from inertial.discovery.running_sums import BOUND
 
 WALKS: Array = np.array([0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0])
 """Variance of the walk from one lot of a station to the next, over that of the noise of a lot."""
 
 WALK_FROM = 2.0
 """Gain of log likelihood from which on stations have a random walk; a value constant within a lot may then be station wander."""
-
-_LARGEST = 5.0
 
 
 @dataclass
@@ -123,7 +122,7 @@ class Wander:
     def update(self, found: Innovation) -> None:
         """Update the filter of a station with a lot; innovations larger than five times their rms are clipped."""
         level, seen = self.level(found.station), found.information > 0.0
-        bounded = np.clip(found.every, -_LARGEST * found.rms, _LARGEST * found.rms)
+        bounded = np.clip(found.every, -BOUND * found.rms, BOUND * found.rms)
         self.log_likelihood += _likelihood(found.every, found)
         moved = np.where(level.known, level.mean + found.gain * bounded * found.roots, found.size)
         safe = np.where(seen, found.information, 1.0)
@@ -135,7 +134,7 @@ class Wander:
 
 def _likelihood(every: Array, found: Innovation) -> Array:
     """Log likelihood ratio (q, h) of innovations at each walk to that without one; innovations are clipped at five rms."""
-    bounded = np.clip(every, -_LARGEST * found.rms, _LARGEST * found.rms) / np.maximum(found.rms, 1e-300)
+    bounded = np.clip(every, -BOUND * found.rms, BOUND * found.rms) / np.maximum(found.rms, 1e-300)
     gained = -np.log(found.roots) - 0.5 * bounded**2
     return np.where(found.known, gained - gained[0], 0.0)
 

@@ -20,25 +20,13 @@ EXAMPLES = ("tumbleline discover --output discoveries.html", "tumbleline discove
 def command(
     archive: ArchiveOption = None,
     device: Annotated[str, option("--device KIND", "Kind of device; that of most runs by default.")] = "",
-    since: Annotated[
-        str, option("--since DATE", "Only lots from this day on; the stored evidence is not changed.")
-    ] = "",
-    driver: Annotated[
-        str, option("--driver a,b", "Only effects that differ by these attributes, such as wafer,station.")
-    ] = "",
-    explain: Annotated[
-        str,
-        option(
-            "--explain ID",
-            "One discovery: its size at each level, the lots that it rests on, and the next measurement.",
-        ),
-    ] = "",
+    since: Annotated[str, option("--since DATE", "Only lots from this day on; the evidence stays as it is.")] = "",
+    driver: Annotated[str, option("--driver a,b", "Only effects by these attributes, such as wafer,station.")] = "",
+    explain: Annotated[str, option("--explain ID", "One discovery: its levels, its lots, the next measurement.")] = "",
     model: Annotated[
         Path | None, option("--model FILE", "A model file: what is left with its effects in the model of every lot.")
     ] = None,
-    html: Annotated[
-        Path | None, option("--output --html -o FILE", "Write the findings with pictures as one page.")
-    ] = None,
+    html: Annotated[Path | None, option("--output --html -o FILE", "Write one page, with pictures.")] = None,
     workers: Annotated[
         int | None, option("--workers", "Processes that score new runs; as many as cores by default.", min=1)
     ] = None,
@@ -46,17 +34,10 @@ def command(
     *,
     reach: Annotated[bool, option("--reach", "Print the smallest effects that this archive could have shown.")] = False,
     populations: Annotated[
-        bool,
-        option(
-            "--populations",
-            "Also test coefficients for two populations, and for correlations; takes a second for each.",
-        ),
+        bool, option("--populations", "Test coefficients for two populations and correlations; a second for each.")
     ] = False,
     looking_back: Annotated[
-        bool,
-        option(
-            "--looking-back", "Judge all lots again with the attributes known now; the stored evidence is not changed."
-        ),
+        bool, option("--looking-back", "Judge all lots again with the attributes known now; nothing is stored.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

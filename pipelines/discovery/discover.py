@@ -153,7 +153,6 @@ def explained(document: DiscoverDocument, name: str) -> DiscoveryRow | Unexplain
     rows = [*document["discoveries"], *document["unexplained"]]
     found = next((row for row in rows if row["id"].lower() == name.lower()), None)
     if found is None:
-        ids = [row["id"] for row in rows]
-        hint = did_you_mean(name, ids) if ids else "there is none in this archive"
+        hint = did_you_mean(name, [row["id"] for row in rows]) if rows else "there is none in this archive"
         raise WrongUse(f"discover: no discovery is called '{name}'; {hint}")
     return found

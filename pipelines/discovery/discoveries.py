@@ -7,14 +7,16 @@ from functools import cached_property
 import numpy as np
 
 from inertial.arrays import Array, Places, over
+from inertial.counts import number_of
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import DriverSums, gathered
 from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
 from inertial.discovery.naming import Name, Unnamed
-from inertial.discovery.pose_shape import SHAPE, angles_of, map_of
-from inertial.discovery.running_sums import Sums
+from inertial.discovery.pose_shape import SHAPE, map_of
+from inertial.discovery.running_sums import growth_of
+from inertial.frames import angles_from_force
 from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow, Scope, UnexplainedRow
-from pipelines.discovery.evidence_state import Alarm, Evidences
+from pipelines.discovery.evidence_state import ALPHA, Alarm, Evidences
 from pipelines.discovery.lot_source import OWN_TEMPCO, SEASON, DiscoveryArchive
 from pipelines.discovery.score_store import AXES
 from schemas.units import MICRO
@@ -33,6 +35,14 @@ _BY_DRIVER: dict[str, tuple[Scope, str]] = {
     UNIT: ("sensor", "the same unit shows it again in later lots, compared with the other units of each lot"),
 }
 """Scope of a discovery that follows from its driver alone, and the reason."""
+_NEXT: dict[str, str] = {
+    STATION: "measure the same units on two of these stations, and check their references",
+    SLOT: "exchange units between slots, or check the fixture at this slot",
+    "sensor_or_station": "measure some units again, turned by 180° in their seats, and on another station: "
+    "an effect that stays with the units is of the sensors",
+}
+_IN_MODEL = "add the effect to the model of the next lots: 'tumbleline extend', then 'tumbleline discover --model'"
+"""The next action by driver or scope, a measurement; else a change of the model."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +181,7 @@ class Discoveries:
             "levels": [],
             "carried_by": {"lots_for": None, "log_e_without_largest_2_percent": None},
             "confirmed": None,
-            "next": _next_of(drivers[0], scope[0]),
+            "next": _NEXT.get(scope[0]) or _NEXT.get(drivers[0], _IN_MODEL),
         }
 
     def _named_row(self, found: Discovery) -> DiscoveryRow:
@@ -277,16 +287,14 @@ class Discoveries:
             return _BY_DRIVER[driver]
         if any(a.driver == driver + INSIDE for a in self._of_sensor):
             return "sensor", "units of one lot differ by it; errors of the station are common to a lot and cancel"
-        if stations < 2:
-            return (
-                "sensor_or_station",
-                "with one station, permanent errors or wander of its references cannot be excluded",
-            )
-        if driver not in {MEAN, DATE, SEASON}:
+        if stations > 1 and driver not in {MEAN, DATE, SEASON}:
             return "sensor", "lots of other stations predict it, which excludes wander of a single station"
-        if self.state.sensor.shared_by_stations()[self.source.pool.everywhere(found.name.effects[0])].any():
-            return "sensor", f"all {stations} stations show it, and they differ by less than it"
-        return "sensor_or_station", f"{stations} stations are too few to exclude permanent errors of their references"
+        here = self.source.pool.everywhere(found.name.effects[0])
+        # an error of one reference is in several columns and axes at once, so that they are no further evidence
+        by_chance = self.state.sensor.alike_by_chance()[here].min() * here.size * len(self.source.pool.effects)
+        if driver == MEAN and by_chance < ALPHA:
+            return "sensor", f"{stations} stations agree better than references that differ at random between them"
+        return "sensor_or_station", f"the references of {number_of(stations, 'station')} may be the cause"
 
     def _unexplained_row(self, driver: str, axis: str, nearest: str) -> UnexplainedRow:
         """The row of a difference by a driver that no effect explains, without a map."""
@@ -311,7 +319,8 @@ class Discoveries:
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
         row = self._unexplained_row(unnamed.driver, "xyz"[best], self._nearest(unnamed.driver))
         row["level"] = unnamed.level
-        row["map"] = np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist()
+        angles = np.degrees(np.column_stack(angles_from_force(force)))
+        row["map"] = np.column_stack([angles, MICRO * np.column_stack(maps[best])]).tolist()
         return row
 
     def _nearest(self, driver: str) -> str:
@@ -350,18 +359,4 @@ def _levels_of(name: Name) -> list[DiscoveredLevel]:
 def _without_largest(carried: Array) -> float:
     """Log evidence of the lots' contributions without the largest two per cent."""
     rest = np.sort(carried)[: max(1, int(0.98 * carried.size))]
-    x = rest / (float(np.sqrt(np.mean(rest**2))) or 1.0)
-    return float(Sums(np.array([x.sum()]), np.array([(x**2).sum()]), two_sided=False).log_e[0])
-
-
-def _next_of(driver: str, scope: Scope) -> str:
-    """The next action: a measurement, or a change of the model."""
-    if scope == "sensor_or_station":
-        return (
-            "measure some of the same units on another station: an effect that stays with the units is of the sensors"
-        )
-    if driver == SLOT:
-        return "exchange units between slots, or check the fixture at this slot"
-    if driver == STATION:
-        return "measure the same units on two of these stations, and check their references"
-    return "add the effect to the model of the next lots: 'tumbleline extend', then 'tumbleline discover --model'"
+    return float(growth_of(rest)[-1])

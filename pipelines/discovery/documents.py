@@ -71,10 +71,7 @@ class DiscoveryRow(TypedDict):
     because: str
     levels: list[DiscoveredLevel]
     carried_by: CarriedBy
-    confirmed: Annotated[
-        bool | None,
-        "whether later lots show what earlier ones predict; null: fewer than 20 of them, or an error of references",
-    ]
+    confirmed: Annotated[bool | None, "whether later lots show what earlier ones predict; null: fewer than 20 of them"]
     confirmed_factor: NotRequired[Annotated[list[float], "later over predicted, and its standard error"]]
     next: str
 
@@ -96,14 +93,9 @@ class UnexplainedRow(TypedDict):
     since: Annotated[str, "day of the first night on which it was beyond the threshold"]
     lots_then: int
     driver: str
-    level: Annotated[
-        str, "level of the driver with the largest dependence, shown by the map; empty: the driver has none"
-    ]
+    level: Annotated[str, "level of the driver that the map shows, the one with most; empty: the driver has none"]
     axes: list[str]
-    map: Annotated[
-        list[list[float]],
-        "outer and inner angle in degrees, the residual and its standard error in µg; empty: no dependence on pose",
-    ]
+    map: Annotated[list[list[float]], "outer, inner angle in degrees, size, its standard error in µg; may be empty"]
     log_e: float
     nearest: Annotated[str, "the effect with the largest evidence"]
 
@@ -162,18 +154,12 @@ class DiscoverDocument(TypedDict):
     discoveries: list[DiscoveryRow]
     held: list[HeldAlarm]
     unexplained: Annotated[list[UnexplainedRow], "evidence that no effect of the catalogue accounts for"]
-    population: Annotated[
-        list[PopulationRow],
-        "with --populations: coefficients with two populations of units, and correlated pairs",
-    ]
+    population: Annotated[list[PopulationRow], "with --populations"]
     reach: list[ReachRow]
     unseen: list[UntoldEffect]
     drivers: list[DriverRow]
     warnings: list[str]
-    compared: Annotated[
-        list[ComparedAlarm],
-        "with --model: discoveries of the sensors before and after its effects are in every lot's model",
-    ]
+    compared: Annotated[list[ComparedAlarm], "with --model: discoveries of the sensors"]
     new: Annotated[list[str], "ids of discoveries and unexplained dependences that are new since the last evaluation"]
     looking_back: bool
 

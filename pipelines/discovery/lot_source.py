@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from datetime import datetime
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from inertial.arrays import Array, Places
+from inertial.arrays import Array
 from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
 from inertial.discovery.naming import Pool
-from inertial.discovery.scores import Column, LotScores, Products
+from inertial.discovery.scores import Column, LotScores, Products, indices
 from pipelines.archive import Archive, Run
 from pipelines.archive.attributes import Attributes, known_attributes
 from pipelines.archive.locks import alone
@@ -149,11 +149,13 @@ class DiscoveryArchive:
             yield run, f"its dwells are those of {twin}, which counts" if twin else reason
 
     @cached_property
+    def _products(self) -> Products:
+        return Products.mean(self.store.products)
+
+    @property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
         """All columns of the sensor and all of the station that occur in any run of the archive."""
-        sensor = dict.fromkeys(column for products in self.store.products for column in products.columns)
-        station = dict.fromkeys(column for products in self.store.products for column in products.station)
-        return tuple(sensor), tuple(station)
+        return self._products.columns, self._products.station
 
     def lots(self, runs: Iterable[str]) -> Iterable[tuple[ScoredLot, ScoredLot]]:
         """For each run the lot of its sensors, and that of its station."""
@@ -163,8 +165,8 @@ class DiscoveryArchive:
 
     def lot_of(self, run: ScoredRun) -> ScoredLot:
         """A run as a lot, in the order of the archive's hypotheses."""
-        scores, k = _scores_of(run), len(self.columns[0])
-        at = _indices(self.columns[0], scores.products.columns)
+        scores, k = cast("LotScores", run.scores), len(self.columns[0])  # only runs with scores are pooled
+        at = indices(self.columns[0], scores.products.columns)
 
         def spread(values: Array) -> Array:
             out = np.zeros((*values.shape[:-1], AXES, k))
@@ -177,27 +179,15 @@ class DiscoveryArchive:
         return self.change(ScoredLot(run.run, run.station, _day(run.when), run.units, *every, levels, numbers, slopes))
 
     def _of_station(self, run: ScoredRun) -> ScoredLot:
-        scores, sums = _scores_of(run), np.zeros((2, len(self.columns[1])))
-        sums[:, _indices(self.columns[1], scores.products.station)] = scores.of_station
+        scores, sums = cast("LotScores", run.scores), np.zeros((2, len(self.columns[1])))
+        sums[:, indices(self.columns[1], scores.products.station)] = scores.of_station
         score, information = sums
         return ScoredLot(run.run, run.station, _day(run.when), ("",), score[None], information[None], information)
 
     @cached_property
     def pool(self) -> Pool:
         """The columns of all effects and their products, averaged over the runs of the archive."""
-        columns, station = self.columns
-        k = len(columns)
-        lot, inside, size = np.zeros((AXES, k, AXES, k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
-        weight = np.zeros(k)
-        for product in self.store.products:
-            at = _indices(columns, product.columns)
-            lots = product.lots * product.lot.reshape(AXES, at.size, AXES, at.size)
-            lot[np.ix_(np.arange(AXES), at, np.arange(AXES), at)] += lots
-            inside[:, at[:, None], at] += product.lots * product.inside
-            size[:, at] += product.lots * product.size.reshape(AXES, -1)
-            weight[at] += product.lots
-        size /= np.maximum(weight, 1.0)
-        return Pool(Products(columns, station, lot.reshape(AXES * k, AXES * k), inside, size.reshape(-1)))
+        return Pool(self._products)
 
     def _drivers(self, run: ScoredRun) -> tuple[dict[str, tuple[str, ...]], dict[str, Array]]:
         levels: dict[str, tuple[str, ...]] = {SLOT: run.slots} if any(run.slots) else {}
@@ -218,12 +208,8 @@ class DiscoveryArchive:
     @cached_property
     def _quantities(self) -> dict[str, dict[str, float] | None]:
         """For each attribute that is a driver its numbers; None for labels."""
-        out: dict[str, dict[str, float] | None] = {}
-        for name in self.attributes.names():
-            if name in {MEAN, STATION, SLOT, UNIT, DATE}:
-                continue
-            out[name] = as_numbers(self.attributes.values(name))
-        return out
+        names = (name for name in self.attributes.names() if name not in {MEAN, STATION, SLOT, UNIT, DATE})
+        return {name: as_numbers(self.attributes.values(name)) for name in names}
 
     def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:
         """A function of unit and n: score and information (h,) of the unit within the first n lots; None if unmeasured.
@@ -262,15 +248,3 @@ class DiscoveryArchive:
 
 def _day(when: str) -> float:
     return datetime.fromisoformat(when).timestamp() / 86400.0
-
-
-def _scores_of(run: ScoredRun) -> LotScores:
-    if run.scores is None:
-        raise LookupError(run.run)
-    return run.scores
-
-
-def _indices(columns: Sequence[Column], of_run: Sequence[Column]) -> Places:
-    """Index of each column of a run among those of the archive."""
-    index = {column: at for at, column in enumerate(columns)}
-    return np.array([index[column] for column in of_run], dtype=np.intp)

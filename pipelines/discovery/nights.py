@@ -16,12 +16,12 @@ from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
-from pipelines.discovery.evidence_state import STATION_DRIVERS, Alarm, Evidences, state_bytes, stored_state
+from pipelines.discovery.evidence_state import Alarm, Evidences, state_bytes, stored_state
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
 
-_VERSION = 3  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
+_VERSION = 4  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
 _GROWN = 1.05  # growth of the number of lots from which on the naming is repeated
 _NOTHING: dict[str, Any] = {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0, "alarms": None}
 
@@ -107,7 +107,6 @@ def _write(
         "runs": list(new),
         "taken_out": list(gone),
         "lots": len(state.order),
-        "hypotheses": len(state.sensor.drivers) * state.sensor.size + len(STATION_DRIVERS) * state.station.count,
         "alarms": [
             {
                 "driver": alarm.driver,
@@ -118,7 +117,6 @@ def _write(
             for alarm in state.alarms
             if alarm.night > before
         ],
-        "largest": {name: round(float(sums.log_e.max()), 2) for name, sums in state.sensor.drivers.items()},
         "state": files.hash_of(data),
         "previous": files.hash_of(files.json_bytes(nights[-1])) if nights else "",
     }

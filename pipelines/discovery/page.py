@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.discovery.evidence import MEAN, STATION
-from inertial.discovery.running_sums import Sums
+from inertial.discovery.running_sums import growth_of
 from inertial.frames import force_from_angles
 from inertial.uncertainty.rounding import short
 from pipelines.discovery.discoveries import Discoveries, plain
@@ -79,16 +79,8 @@ def _growth_charts(found: Discoveries, document: DiscoverDocument) -> dict[str, 
         carried = known.get((row["recommended"], row["driver"]))
         if carried is None or carried.size < 2:
             continue
-        x = carried / max(float(np.sqrt(np.mean(carried**2))), 1e-300)
-        evidence = [
-            float(Sums(np.array([s]), np.array([v]), two_sided=False).log_e[0])
-            for s, v in zip(np.cumsum(x), np.cumsum(x**2), strict=True)
-        ]
-        lots = np.arange(1, x.size + 1, dtype=np.float64)
-        traces = (
-            Trace("evidence", lots, np.array(evidence) / np.log(10.0), "line", "accent", width=2.0),
-            level(lots, 0.0),
-        )
+        lots, evidence = np.arange(1.0, carried.size + 1.0), growth_of(carried) / np.log(10.0)
+        traces = Trace("evidence", lots, evidence, "line", "accent", width=2.0), level(lots, 0.0)
         plot = Plot("", PlotAxis("lots"), PlotAxis("evidence / powers of ten"), traces)
         note = "each lot against what the other half of the lots predicts of it"
         charts[f"grown-{row['id']}"] = Chart("How the evidence came together", (plot,), height=240, note=note)

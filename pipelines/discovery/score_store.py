@@ -10,7 +10,7 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -61,11 +61,12 @@ class ScoreStore:
                 derived.warn_of_edits(path)
             if state != derived.SOUND or (read := content_of(data)) is None:
                 continue
-            for row, head in enumerate(read.table.select([*TEXTS, "units", "prints", "floor"]).to_pylist()):
+            table, of_file = read
+            for row, head in enumerate(table.select([*TEXTS, "units", "prints", "floor"]).to_pylist()):
                 # interned, because many of a hundred thousand runs have equal texts
                 head |= {name: sys.intern(head[name]) for name in TEXTS if name not in {"run", "when"}}
                 heads.setdefault(head["run"], head | {"file": path, "row": row})
-            for name, product in read.products.items():
+            for name, product in of_file.items():
                 products[name] = product if name not in products else Products.mean([products[name], product])
         return heads, products
 
@@ -88,7 +89,7 @@ class ScoreStore:
                 raise ArchiveUnusable(f"{path}: the scores were changed while they were read; run it again")
             while len(self._opened) >= MOST_OPEN:
                 self._opened.pop(next(iter(self._opened)))
-            self._opened[path] = read.table
+            self._opened[path] = read[0]
         return run_of(self._opened[path].slice(self.heads[run]["row"], 1).to_pylist()[0], self._all[1])
 
     def add(self, ids: Sequence[str], workers: int, distribute: Distributor | None = None) -> int:
@@ -137,15 +138,8 @@ def written(runs: Sequence[ScoredRun]) -> bytes:
     return len(data).to_bytes(8, "big") + data + buffer.getvalue()
 
 
-class Content(NamedTuple):
-    """A file of scores: its rows, and the products of its columns by their hash."""
-
-    table: pa.Table
-    products: dict[str, Products]
-
-
-def content_of(data: bytes) -> Content | None:
-    """The content of a file of scores; None for another version of the layout."""
+def content_of(data: bytes) -> tuple[pa.Table, dict[str, Products]] | None:
+    """The rows of a file of scores, and the products of its columns by their hash; None for another version of the layout."""
     length = int.from_bytes(data[:8], "big")
     table = pq.read_table(pa.BufferReader(data[8 : 8 + length]))
     about = json.loads((table.schema.metadata or {}).get(b"about", b"{}"))
@@ -158,7 +152,7 @@ def content_of(data: bytes) -> Content | None:
                 columns, of_station = (tuple((str(e), int(k)) for e, k in listed) for listed in (sensor, station))
                 parts = {key: arrays[f"{name}/{key}"] for key in ("size", "within", "across", "inside")}
                 products[name] = Products(columns, of_station, *_unfolded(parts, len(columns)), lots=int(lots))
-    return Content(table, products)
+    return table, products
 
 
 def run_of(row: Mapping[str, Any], products: Mapping[str, Products]) -> ScoredRun:

@@ -1,7 +1,5 @@
 """Discoveries in sentences, for the screen, the page, the workbench and the alerts."""
 
-import math
-
 import numpy as np
 
 from inertial.discovery.evidence import MEAN
@@ -34,8 +32,14 @@ def scope_text(row: DiscoveryRow) -> str:
     text = f"{_SCOPES[row['scope']]}: {row['because']}"
     if row["kind"] == "levels" and row["levels"]:
         top = row["levels"][0]
-        text += f"; largest {top['level']} {_signed(top['size_ug'])} ± {short(2.0 * top['u_ug'])} µg"
+        sign = "+" if top["size_ug"] >= 0 else "−"
+        text += f"; largest {top['level']} {sign}{short(abs(top['size_ug']))} ± {short(2.0 * top['u_ug'])} µg"
     return text
+
+
+def texts_of(row: DiscoveryRow | UnexplainedRow) -> list[str]:
+    """All sentences on a discovery or an unexplained dependence."""
+    return [unexplained_text(row)] if "nearest" in row else [headline(row), scope_text(row), *support_text(row)]
 
 
 def support_text(row: DiscoveryRow) -> list[str]:
@@ -64,7 +68,3 @@ def unexplained_text(row: UnexplainedRow) -> str:
         value = f"{short(abs(float(size[largest])))} ± {short(2.0 * float(error[largest]))} µg"
         text += f"; up to {value} in axis {row['axes'][0]}"
     return f"{text}; found on {row['since']}, with lot {row['lots_then']}"
-
-
-def _signed(value: float) -> str:
-    return f"{'+' if value >= 0 else '−'}{short(abs(value))}" if math.isfinite(value) else "–"

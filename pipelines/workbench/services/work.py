@@ -259,13 +259,12 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
     from pipelines.discovery import page
     from pipelines.discovery.discover import Look
     from pipelines.discovery.discover import discovered as looked_at
-    from pipelines.discovery.sentences import headline, scope_text, support_text, unexplained_text
+    from pipelines.discovery.sentences import texts_of
 
     looked = looked_at(Archive(request["archive"]), Look(device=str(request["device"])))
     report_progress(1, 2, "drawing")
     document = looked.document
-    texts = {row["id"]: (headline(row), scope_text(row), *support_text(row)) for row in document["discoveries"]}
-    texts |= {row["id"]: (unexplained_text(row),) for row in document["unexplained"]}
+    texts = {row["id"]: texts_of(row) for row in (*document["discoveries"], *document["unexplained"])}
     return {"document": document, "charts": page.charts_of(looked.found, document), "texts": texts}
 
 

@@ -13,13 +13,16 @@ import pandas as pd
 import pytest
 from demonstrations import wafer_line
 
+from inertial.discovery.naming import Name
+from inertial.discovery.running_sums import Levels, Scale
+from inertial.discovery.station_wander import Wander
 from inertial.frames import to_fixture
 from pipelines.archive import Archive, derived, files
 from pipelines.audit.calibrations import Calibrations
 from pipelines.demo.archive_lots import STATIONS, Line, write_lots, write_run
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
-from pipelines.discovery.discoveries import Discoveries
+from pipelines.discovery.discoveries import Discoveries, Discovery
 from pipelines.discovery.evidence_state import ALPHA, STATION_DRIVERS, Alarm
 from pipelines.discovery.findings import document_of
 from pipelines.discovery.lot_source import DiscoveryArchive
@@ -320,3 +323,38 @@ def test_shares_of_hypotheses_add_up_to_the_probability_of_an_error_and_an_effec
             patch.setattr(type(sensor), "guarded", np.zeros(sensor.count, dtype=bool))
             assert state.held(alarm) is is_held
             assert state.held(replace(alarm, index=int(axes[1])))
+
+
+def test_errors_that_references_of_stations_have_alike_by_chance_are_not_said_to_be_of_the_sensors(
+    archive: Archive, rng: np.random.Generator
+) -> None:
+    """A reference has few errors, each in many columns and axes: four of them, at random in each of four stations."""
+    source = DiscoveryArchive(archive)
+    found = Discoveries(source, brought_up(source))
+    sensor, pool = found.state.sensor, source.pool
+    sensor._scales = {"between": Scale(np.ones(sensor.count))}
+
+    def scopes(sizes: np.ndarray) -> set[str]:
+        """Scopes of means of all effects, at stations (k, h) of these sizes, well known."""
+        sensor.levels["station"] = table = Levels(sensor.count)
+        sensor.wander = Wander(sensor.count)
+        for k, size in enumerate(sizes):
+            table.add((f"s{k}",), 1e8 * size[None], np.full((1, sensor.count), 1e8))
+            sensor.wander.level(f"s{k}")
+        nothing = np.zeros((1, 3))
+        names = (Name((effect,), ("mean",), ("all",), np.ones(1), nothing, nothing, 50.0) for effect in pool.effects)
+        return {
+            found._scope(Discovery(name, Alarm("mean", 0, 1, 40, 20.0), ("mean",), np.zeros(1), None))[0]
+            for name in names
+        }
+
+    pattern = rng.standard_normal((4, sensor.count))
+    told = sum("sensor" in scopes(rng.standard_normal((4, 4)) @ pattern) for _ in range(40))
+    assert told <= 5  # 5 % are allowed; more than this come with 1.4 %
+    # what is much larger than the differences is told, with more stations by a smaller ratio
+    common, apart = np.ones(sensor.count), rng.standard_normal((4, sensor.count))
+    assert scopes(common + 0.02 * apart / apart.std(axis=0)) == {"sensor"}
+    assert "sensor" not in scopes(common + 0.3 * (apart - apart.mean(axis=0)) / apart.std(axis=0))
+    twelve = rng.standard_normal((12, sensor.count))
+    assert scopes(common + 0.3 * (twelve - twelve.mean(axis=0)) / twelve.std(axis=0)) == {"sensor"}
+    assert scopes(common[None]) == scopes(common + apart[:2]) == {"sensor_or_station"}

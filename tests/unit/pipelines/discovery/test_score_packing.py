@@ -32,8 +32,9 @@ def test_scores_keep_a_thirtieth_of_their_standard_deviation_and_information_a_h
     runs = [made(f"r{k}", size, rng) for k in range(5)]
     content = content_of(written(runs))
     assert content is not None
-    for row, run in zip(content.table.to_pylist(), runs, strict=True):
-        again = run_of(row, content.products)
+    table, products = content
+    for row, run in zip(table.to_pylist(), runs, strict=True):
+        again = run_of(row, products)
         before, after = run.scores, again.scores
         assert before is not None
         assert after is not None
@@ -58,7 +59,7 @@ def test_products_of_columns_are_correlations_within_and_between_axes() -> None:
     scores = replace(run.scores, products=replace(run.scores.products, lot=lot, inside=inside))
     content = content_of(written([replace(run, scores=scores)]))
     assert content is not None
-    (product,) = content.products.values()
+    (product,) = content[1].values()
     exact = lot / np.sqrt(np.outer(np.diagonal(lot), np.diagonal(lot)))
     assert product.lot == pytest.approx(exact, abs=1.0 / 256.0)
     for axis in range(3):
