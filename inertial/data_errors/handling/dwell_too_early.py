@@ -28,7 +28,8 @@ class DwellTooEarly(OfOneDwell):
         return bool(0.0 < size[0] < 1.0)
 
     def describe(self, lot: Lot, size: Array, **location: float) -> str:
-        return f"the dwell holds {100.0 * float(size[0]):.2g} % of the pose before, for all units; the dwell is left out"
+        share = 100.0 * float(size[0])
+        return f"the dwell holds {share:.2g} % of the pose before, for all units; the dwell is left out"
 
     def mended(self, lot: Lot, size: Array, **location: float) -> Lot | None:
         return without(lot, self.dwells(lot, **location))
