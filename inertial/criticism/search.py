@@ -346,15 +346,19 @@ def _initial_states(model: Model, term: Term) -> tuple[Term, ...]:
 
 
 def ranked(rivals: Sequence[Rival]) -> list[Rival]:
-    """Rivals, best first, all judged at the φ and also at the wander of the rival that is best when each has its own.
+    """Rivals, best first, all judged at the φ and also at the wander of the best of them, which is best there, too.
 
     Two effects that are identical in the poses of a plan have equal residuals, but φ, estimated from medians, changes their
     deviances by a few per cent: each judged at its own φ, they could fall into different classes.
     """
     ordered = sorted(rivals, key=lambda r: r.cost)
-    if not ordered or (best := ordered[0].ratio) is None:
-        return ordered
-    return sorted((r.at(best) for r in ordered), key=lambda r: r.cost)
+    for _ in rivals:
+        before, best = ordered[0].term, ordered[0].ratio
+        if best is not None:
+            ordered = sorted((r.at(best) for r in ordered), key=lambda r: r.cost)
+        if ordered[0].term is before:
+            break
+    return ordered
 
 
 def _reexamine(
