@@ -75,6 +75,12 @@ def test_what_a_sample_of_a_large_lot_takes_for_a_handling_error_is_judged_in_th
     assert (found.handled, ["third_order" in named.effects.ids for named in found.named]) == ((), [True])
 
 
+def test_rivals_are_compared_at_the_wander_of_the_one_that_stays_best() -> None:
+    """A lag was ahead of this quadratic at a wander that the quadratic was not judged at; at equal wander it is behind."""
+    found = diagnose(many_units(100, 8503, "quadratic", 1.0), MODEL, np.random.default_rng(2))
+    assert [named.effects.ids[0] for named in found.named] == ["bias_temperature_quadratic"]
+
+
 @pytest.mark.parametrize("common", ["poses", pytest.param("", marks=pytest.mark.slow)])
 def test_noise_and_poses_that_differ_alike_for_all_of_many_units_are_no_effect(common: str) -> None:
     found = diagnose(many_units(80, 43, common, 1.5), MODEL, np.random.default_rng(2))
