@@ -250,7 +250,7 @@ def some_unsteady(document: dict, _: MadeLot) -> bool:
 
 def jumps_are_told(document: dict, _: MadeLot) -> bool:
     told = {dwell for group in document["classes"] for dwell in group["dwells"]}
-    told |= {row["dwell"] for row in document["removed"]["dwells"]}
+    told |= {row["dwell"] for row in (document["removed"] or {"dwells": []})["dwells"]}
     return bool(told & {0, 1}) and told >= {32, 42}
 
 
