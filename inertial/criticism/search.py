@@ -300,7 +300,7 @@ def judge(field: Candidates, model: Model, term: Term) -> Rival:
 
 
 def _only_tilted(model: Model, term: Term) -> bool:
-    """Whether two angle errors explain a dwell up to noise and their own second-order terms.
+    """Whether an error that all units share explains a dwell up to noise and the second-order terms of two angles.
 
     A supply drop, or a bias of the complete lot that is high in one dwell, changes each unit and axis by a different amount. Part
     of that resembles two angle errors; the residual shows that it is none. The unit with the largest residual is not counted,
@@ -348,8 +348,8 @@ def _initial_states(model: Model, term: Term) -> tuple[Term, ...]:
 def ranked(rivals: Sequence[Rival]) -> list[Rival]:
     """Rivals, best first, all judged at the φ and also at the wander of the best of them, which is best there, too.
 
-    Two effects that are identical in the poses of a plan have equal residuals, but φ, estimated from medians, changes their
-    deviances by a few per cent: each judged at its own φ, they could fall into different classes.
+    Two effects that are identical in the poses of a plan have equal residuals, but φ, estimated from quantiles, changes
+    their deviances by a few per cent: each judged at its own φ, they could fall into different classes.
     """
     ordered = sorted(rivals, key=lambda r: r.cost)
     for _ in rivals:

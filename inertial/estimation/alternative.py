@@ -126,11 +126,24 @@ class Handling(Effect):
 
 
 class OfOneDwell(Handling):
-    """A handling error of a single dwell, ``at``: all dwells are searched in one pass."""
+    """A handling error of a single dwell, ``at``: all dwells are searched in one pass, and a dwell that is found is left out."""
 
     @abstractmethod
     def every_dwell(self, lot: "Lot") -> Array:
         """Columns (units or 1, n, 3, k), g per unit of the coefficient, of an error in each of the n dwells."""
+
+    def change(self, lot: "Lot", slope: Array | None, **location: float) -> Array:
+        """The error in its dwell alone."""
+        here = np.arange(lot.state.time.shape[1]) == int(location["at"])
+        return self.every_dwell(lot) * here[:, None, None]
+
+    def dwells(self, lot: "Lot", **location: float) -> list[int]:
+        """The dwell."""
+        return [int(location["at"])]
+
+    def mended(self, lot: "Lot", size: Array, **location: float) -> "Lot | None":
+        """The lot without the dwell."""
+        return without(lot, self.dwells(lot, **location))
 
 
 def of_outputs(lot: "Lot", change: Array) -> Array:

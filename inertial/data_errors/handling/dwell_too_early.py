@@ -1,6 +1,6 @@
 import numpy as np
 
-from inertial.estimation.alternative import Array, OfOneDwell, common_force, without
+from inertial.estimation.alternative import Array, OfOneDwell, common_force
 from inertial.estimation.lot import Lot
 
 
@@ -20,19 +20,9 @@ class DwellTooEarly(OfOneDwell):
         force = common_force(lot)
         return (np.roll(force, 1, axis=1) - force)[..., None]
 
-    def change(self, lot: Lot, slope: Array | None, **location: float) -> Array:
-        here = np.arange(lot.state.time.shape[1]) == int(location["at"])
-        return self.every_dwell(lot) * here[:, None, None]
-
     def possible(self, size: Array) -> bool:
         return bool(0.0 < size[0] < 1.0)
 
     def describe(self, lot: Lot, size: Array, **location: float) -> str:
         share = 100.0 * float(size[0])
         return f"the dwell holds {share:.2g} % of the pose before, for all units; the dwell is left out"
-
-    def mended(self, lot: Lot, size: Array, **location: float) -> Lot | None:
-        return without(lot, self.dwells(lot, **location))
-
-    def dwells(self, lot: Lot, **location: float) -> list[int]:
-        return [int(location["at"])]

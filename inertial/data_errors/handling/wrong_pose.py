@@ -5,7 +5,7 @@ from inertial.estimation.alternative import Array, OfOneDwell, pose_errors
 from inertial.estimation.lot import Lot
 
 
-class WrongPose(DirectionOff, OfOneDwell):
+class WrongPose(OfOneDwell, DirectionOff):
     """A pose that the table missed in one dwell, for all units."""
 
     id = "wrong_pose"
@@ -19,6 +19,3 @@ class WrongPose(DirectionOff, OfOneDwell):
 
     def every_dwell(self, lot: Lot) -> Array:
         return pose_errors(lot.state)
-
-    def dwells(self, lot: Lot, **location: float) -> list[int]:
-        return [int(location["at"])]
