@@ -6,7 +6,7 @@ import numpy as np
 
 from inertial.arrays import Array
 from inertial.data_errors.removed_dwells import model_without
-from inertial.estimation.likelihood import common_part, noise_together, of_station, scatter_beside, weighed
+from inertial.estimation.likelihood import common_part, of_station, scatter_beside, shared_noise, weighed
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import fall, freedom
 from inertial.estimation.term import Term
@@ -91,6 +91,6 @@ def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> fl
         return 0.0
     richer = model.with_term(term)
     common = replace(
-        common_part(space, term, rest.problem, gain), noise=max(noise_together(richer), scatter_beside(richer, term))
+        common_part(space, term, rest.problem, gain), noise=max(shared_noise(richer), scatter_beside(richer, term))
     )
     return weighed(float(fall(space, gain)[0]), rank, freedom(term), common=common).log_p

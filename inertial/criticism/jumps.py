@@ -1,7 +1,8 @@
-"""Jumps of single axes in place of an effect: telegraph noise of a few axes can imitate a slow effect of the complete lot.
+"""Jumps of single axes in place of an effect or of slow noise: telegraph noise of a few axes can imitate both.
 
 An effect has coefficients for every unit and axis, so that one effect explains independent jumps of three axes better than any
-single jump does. The jumps of a few axes together are therefore compared with the effect, at the same noise.
+single jump does. The jumps of a few axes together are therefore compared with the effect, at the same noise. Slow
+noise follows jumps up and down, too: each of them alone leaves it as it is, all of them together leave none.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,15 +13,16 @@ import numpy as np
 
 from inertial.arrays import Array
 from inertial.criticism.field import Candidates, Rival
-from inertial.decisions import CLASS_WIDTH, JUMPS_RARE
+from inertial.decisions import CLASS_WIDTH, JUMPS_RARE, LESS_FLICKER, LESS_WALK, NAMED_BELOW
 from inertial.estimation.alternative import Handling
 from inertial.estimation.bases import SEEN
 from inertial.estimation.candidate import Candidate
+from inertial.estimation.likelihood import restricted_deviance
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import freedom, price
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
-from inertial.probability import log_f_tail
+from inertial.probability import log_chi2_tail, log_f_tail
 
 _AXES = 6
 """Largest number of axes whose jumps may replace one effect."""
@@ -44,8 +46,11 @@ class Jumps:
 class _AxisJumps:
     """The best jumps of one axis, with their score."""
 
-    score: float
-    terms: tuple[Term, ...]
+    score: float = 0.0
+    terms: tuple[Term, ...] = ()
+
+
+_NONE = _AxisJumps()
 
 
 def jumps_in_place_of(field: Candidates, model: Model, *rivals: Rival) -> Jumps | None:
@@ -74,6 +79,32 @@ def jumps_in_place_of(field: Candidates, model: Model, *rivals: Rival) -> Jumps 
             terms += found.terms
     ahead = float(together - score)
     return Jumps(tuple(terms), ahead) if terms and ahead > -CLASS_WIDTH else None
+
+
+def jumps_in_place_of_wander(field: Candidates, model: Model) -> tuple[Term, ...]:
+    """The jumps of a single axis that explain more than its slow noise in a model; empty if there are none."""
+    shares, blocks = model.noise.shares, field.problem.blocks
+    # the slow noise of a lot of many axes is not that of a few; a single jump is judged at the noise of every rival
+    slow = [block for block in range(blocks) if blocks <= 2 * _AXES or shares.of_block(block) != shares.common]
+    tried, most = tuple[Term, ...](), 0.0
+    for less in {shares.times(1.0, 0.0), shares.times(LESS_FLICKER, LESS_WALK), shares.times(0.0, 0.0)} - {shares}:
+        space = model.at(model.noise_at(less))
+        found = max((_best(field, space, block, {}) for block in slow), key=lambda jumps: jumps.score, default=_NONE)
+        gain = _beyond_wander(field, model, found.terms) if found.terms else 0.0
+        if gain > most:
+            tried, most = found.terms, gain
+    return tried
+
+
+def _beyond_wander(field: Candidates, model: Model, jumps: tuple[Term, ...]) -> float:
+    """Score of jumps of an axis, with the noise estimated again; zero if they are not significant over all tests."""
+    richer = Model(model.problem, [*model.terms, *jumps], near=model.noise)
+    deviance = restricted_deviance(model.space, model.space) - restricted_deviance(model.at(richer.noise), richer.space)
+    count, looks = len(jumps), field.looks
+    chosen = log(comb(field.problem.n - 1, count) * field.problem.blocks) + 0.5 * JUMPS_RARE
+    score = deviance - price(deviance, count) - 2.0 * chosen
+    likely = float(log_chi2_tail(deviance, count)) + chosen + log(max(looks, 1)) > log(NAMED_BELOW)
+    return 0.0 if likely or score < log(max(field.problem.count, 1)) else score
 
 
 def _drops(space: Space, candidate: Candidate) -> Array:
@@ -137,7 +168,7 @@ def _single_jumps(field: Candidates, space: Space, alternatives: Sequence[Handli
 def _best(field: Candidates, space: Space, block: int, single: dict[int, _AxisJumps]) -> _AxisJumps:
     """The best jumps of one block: a single handling error, or several jumps from level to level."""
     axes = len(space.q)
-    tried = [_AxisJumps(0.0, ()), *([single[block]] if block in single else [])]
+    tried = [_NONE, *([single[block]] if block in single else [])]
     jump = next((a for a in field.handling if a.several and a.id in field.grids), None)
     if jump is not None:
         unit, axis = divmod(block, field.problem.per_unit)

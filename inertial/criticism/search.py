@@ -7,7 +7,7 @@ import numpy as np
 
 from inertial import decisions
 from inertial.criticism.field import Candidates, Rival
-from inertial.criticism.jumps import jumps_in_place_of
+from inertial.criticism.jumps import jumps_in_place_of, jumps_in_place_of_wander
 from inertial.decisions import CERTAIN_BELOW, CLASS_WIDTH, JUMPS_RARE, MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.estimation.alternative import Handling, OfOneDwell
 from inertial.estimation.candidate import Candidate
@@ -59,6 +59,7 @@ def search(
     """
     chosen: list[Term] = list(start)
     model, ladder = Model(field.problem, [*base.terms, *chosen], near=base.noise) if chosen else base, ()
+    best: Rival | None = None
     for _ in range(_MOST - len(chosen)):
         rivals = contest(field, model)
         ladder = ladder or tuple(rivals)
@@ -84,7 +85,7 @@ def search(
                 return SearchResult(model, tuple(chosen), ladder, (handled,))
     if len(chosen) > len(start):
         model, chosen = _replaced_by_two(field, base, model, chosen)
-    return SearchResult(model, tuple(chosen), ladder)
+    return SearchResult(model, tuple(chosen), ladder, jumps_in_place_of_wander(field, model) if best is None else ())
 
 
 def _added_or_jumps(

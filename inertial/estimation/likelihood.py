@@ -102,7 +102,7 @@ def _ratio(model: Model, term: Term, locations: int, noises: Sequence[Noise], sh
         return _ratio(model, term, locations, [*noises, model.with_term(term).noise_at(others)], shared)
 
     # φ with the term in the model: an effect common to all units must not count as shared noise
-    return again(noise_together(richer) if shared is None else shared, shares)
+    return again(shared_noise(richer) if shared is None else shared, shares)
 
 
 @dataclass(frozen=True)
@@ -166,15 +166,7 @@ def restricted_deviance(contrasts: Space, left: Space) -> float:
 
 
 def shared_noise(model: Model) -> float:
-    """φ: variance of the mean residual over the units, over its value for independent units; 1 for a single unit.
-
-    It is estimated from the median of the squares, so that one wrong pose does not raise it.
-    """
-    return together(model.space, model.space.residual, (0.5,)) if several(model) else 1.0
-
-
-def noise_together(model: Model) -> float:
-    """φ by the largest of the quantiles, which also sees what units share in some poses only; 1 for a single unit."""
+    """φ: variance of the mean residual over the units, over its value for independent units; 1 for a single unit."""
     return together(model.space, model.space.residual) if several(model) else 1.0
 
 
@@ -183,12 +175,10 @@ def several(model: Model) -> bool:
     return model.problem.lot.state.time.shape[0] > 1 and not model.problem.lot.radial
 
 
-def together(
-    space: Space, residual: Array, quantiles: tuple[float, ...] = _QUANTILES, errors: float = TOGETHER
-) -> float:
+def together(space: Space, residual: Array, errors: float = TOGETHER) -> float:
     """φ of whitened residuals (blocks, n) of several units, by the largest of some quantiles of the squares of their mean.
 
-    Pose errors act on some axes in some poses only, which the median alone does not show.
+    One wrong pose does not raise quantiles; pose errors act on some axes in some poses only, which the median does not show.
 
     Parameters
     ----------
@@ -202,12 +192,12 @@ def together(
     if squares.size < _FEWEST_POSES:
         return 1.0
     lost = max(space.dof / max(int(space.covariance.count.sum()), 1), 0.1)
-    return _above_noise(squares / lost, 1, quantiles, errors)
+    return _above_noise(squares / lost, 1, errors)
 
 
-def _above_noise(values: Array, dof: int, quantiles: tuple[float, ...] = _QUANTILES, errors: float = TOGETHER) -> float:
+def _above_noise(values: Array, dof: int, errors: float = TOGETHER) -> float:
     """The largest ratio of quantiles of values to those of chi-square, as far as it exceeds one by some standard errors."""
-    quantile = np.array(quantiles)
+    quantile = np.array(_QUANTILES)
     expected = chi2_quantile(quantile, dof)
     ratio = np.quantile(values, quantile) / expected
     density = 0.5 * (0.5 * expected) ** (0.5 * dof - 1.0) * np.exp(-0.5 * expected) / gamma(0.5 * dof)

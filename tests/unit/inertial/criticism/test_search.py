@@ -107,3 +107,24 @@ def test_a_saw_tooth_of_every_unit_is_a_course_over_time_and_no_change_of_single
     assert (found.adequate, found.handled, found.named, found.removed) == (False, (), (), ())
     assert found.unexplained is not None
     assert found.unexplained.driver == "time_s"
+
+
+@each(["telegraph", "walk"])
+def test_a_bias_that_jumps_up_and_down_several_times_is_no_random_walk(way: str) -> None:
+    told: list[int] = []
+    for seed in range(4):
+        rng, lot = np.random.default_rng(seed), lot_in(make(World(units=1), 7_300_000 + seed))
+        n = lot.state.time.shape[1]
+        # between two soaks a jump is also an effect of temperature, or what a walk did in the pause
+        inside = np.flatnonzero(np.arange(n) % (n // 3) > 2)
+        jumps = np.sort(rng.choice(inside, 4, replace=False))
+        telegraph = 3e-4 * (np.searchsorted(jumps, np.arange(n), side="right") % 2)
+        path = telegraph if way == "telegraph" else 6e-5 * np.cumsum(rng.standard_normal(n))
+        output = lot.output + np.where(np.arange(3) == seed % 3, path[:, None], 0.0)
+        found = diagnose(replace(lot, output=output), BASE, np.random.default_rng(2))
+        # a state of few dwells is told as such, in place of the two jumps around it
+        near = {dwell for named in found.handled for k in named.dwells for dwell in (k - 1, k, k + 1)}
+        near |= {dwell.index[1] for dwell in found.removed}
+        told.append(len(set(jumps.tolist()) & near))
+        assert not found.named
+    assert told == ([4, 4, 4, 4] if way == "telegraph" else [0, 0, 0, 0])
