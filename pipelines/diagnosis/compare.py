@@ -54,14 +54,21 @@ def compare(
     """
     try:
         with threadpool_limits(1):
-            remeasured = None if fresh is None else measured(fresh, fresh_history)
-            return _compared(measured(dwells, history), effects, remeasured, before)
+            return _compared(*both_measured(dwells, history, fresh, fresh_history), effects, before)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
 
+def both_measured(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, fresh: pd.DataFrame | None, fresh_history: pd.DataFrame | None
+) -> tuple[Measured, Measured | None]:
+    """A run and the fresh run with its units in the same order; refused if they differ or the dwells are the same."""
+    first = measured(dwells, history)
+    return first, None if fresh is None else _same_units(first, measured(fresh, fresh_history))
+
+
 def _compared(
-    measurement: Measured, effects: Sequence[str], fresh: Measured | None, before: Sequence[str] | None
+    measurement: Measured, again: Measured | None, effects: Sequence[str], before: Sequence[str] | None
 ) -> ComparisonDocument:
     square = "misalignment" not in effects
     problem = Problem(lot_of(measurement, square=square))
@@ -91,9 +98,7 @@ def _compared(
         "warnings": without_history(measurement, model.terms),
         "progress": None,
     }
-    again: Measured | None = None
-    if fresh is not None:
-        again = _same_units(measurement, fresh)
+    if again is not None:
         on_fresh = residuals_of(Problem(lot_of(again, like=measurement, square=square)), fitted)
         answer["fresh_rms_ug"] = MICRO * rms(on_fresh)
         for unit, values in zip(again.units, on_fresh.reshape(len(again.units), -1), strict=True):

@@ -99,8 +99,11 @@ class Improvement:
 
     def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> ImproveDocument:
         """The document of the improvement; the model file is written last, after all checks."""
+        from pipelines.diagnosis.compare import both_measured
         from pipelines.jobs.model_files import publish_model
 
+        tables = self.tables
+        both_measured(tables.dwells, tables.history, tables.fresh, tables.fresh_history)  # refused before the diagnoses
         before = self._diagnosis(judged, first=True)
         choices = self._choices(before, named, yes=yes)
         added = [choice["effect"] for choice in choices if choice["added"]]

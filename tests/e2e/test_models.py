@@ -5,6 +5,7 @@ import re
 import sys
 from pathlib import Path
 
+import pandas as pd
 import printed_pages as pages
 import pytest
 from demonstrations import demonstration, demonstrations_measured_once
@@ -154,6 +155,18 @@ def test_a_question_that_is_refused_or_not_answered_writes_nothing(
     assert (status, "give --yes to run without an operator" in " ".join(err.split())) == (2, True)
     assert not target.exists()
     assert "--yes" in terminal.UNATTENDED  # other questions keep their words
+
+
+def test_a_fresh_run_that_lacks_a_unit_is_refused_before_the_diagnosis(
+    alike: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dwells = pd.read_parquet(alike / "dwells.parquet")
+    lacking = dwells[dwells["unit"] != dwells["unit"].iloc[0]]
+    lacking.to_parquet(tmp_path / "fresh.parquet")
+    monkeypatch.setattr("pipelines.diagnosis.diagnose.examined", lambda *_: pytest.fail("a diagnosis was made"))
+    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--output", tmp_path / "m.toml", "--yes")
+    said = refused(*words, "--fresh", tmp_path / "fresh.parquet")
+    assert f"{dwells['unit'].iloc[0]} not in both runs, every unit is needed in both" in said
 
 
 @pytest.mark.slow
