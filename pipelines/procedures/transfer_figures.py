@@ -17,6 +17,8 @@ from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, PLAIN, Points, Tr
 from pipelines.procedures.figures import FigureValue, probability, with_uncertainty
 
 MOST_KEPT = 64
+_REACH = 20.0  # of the highest frequency of the points: what a model does above it is not measured
+_DAMPING = 1e-3, 1e2  # ratios beyond which the responses of a range of frequencies differ by less than any points show
 _last_judged: dict[str, TransferDiagnosis] = {}
 """Diagnoses of the last transfer functions: the report draws what the stage has judged in the same process."""
 
@@ -59,31 +61,45 @@ def figures_of_model(axis: str, diagnosis: TransferDiagnosis, points: Points, te
             or "the model, also with the effects found, does not describe the points"
         )
         return [FigureValue.not_determined(name, axis, why) for name in names]
+    top = float(points.conditions.frequency.max())
     return [
-        replace(_bandwidth(axis, diagnosis, points), figure=names[0]),
-        _parameter(names[1], "natural_hz", axis, diagnosis),
-        _parameter(names[2], "damping", axis, diagnosis),
+        replace(_bandwidth(axis, diagnosis, top), figure=names[0]),
+        _parameter(names[1], "natural_hz", axis, diagnosis, (0.0, _REACH * top)),
+        _parameter(names[2], "damping", axis, diagnosis, _DAMPING),
     ]
 
 
-def _parameter(figure: str, name: str, axis: str, diagnosis: TransferDiagnosis) -> FigureValue:
+def _parameter(
+    figure: str, name: str, axis: str, diagnosis: TransferDiagnosis, within: tuple[float, float]
+) -> FigureValue:
     if not diagnosis.extended.has(name):
         return FigureValue.not_determined(figure, axis, f"the model has no {WORD.get(name, name)}")
     parameter = diagnosis.parameter(name)
     if parameter.identified:
         return FigureValue(figure, axis, parameter.value, parameter.uncertainty, parameter.low, parameter.high)
-    note = f"not identified by these points: 95 % interval {parameter.low:.4g} … {parameter.high:.4g}"
+    low, high, known = _interval(parameter.low, parameter.high, within)
+    note = f"not identified by these points: {known}"
     if parameter.rival is not None:
         model, of_rival = " + ".join(parameter.rival.effects), parameter.rival.of(name)[0]
         note += f"; {model}, with {of_rival:.4g}, describes the points as well"
     where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)
     note += f"; measure at {where}" if where else "; sweep to higher frequencies"
-    return FigureValue.not_determined(figure, axis, note, parameter.low, parameter.high)
+    return FigureValue.not_determined(figure, axis, note, low, high)
+
+
+def _interval(low: float, high: float, within: tuple[float, float]) -> tuple[float, float, str]:
+    """Ends of a 95 % interval and its text; NaN for an end that lies beyond what the points can show."""
+    low, high = low if low > within[0] else float("nan"), high if high < within[1] else float("nan")
+    if np.isnan(low) and np.isnan(high):
+        return low, high, "they leave it open"
+    if np.isnan(high):
+        return low, high, f"at least {low:.4g}, with 95 %"
+    return low, high, f"at most {high:.4g}, with 95 %" if np.isnan(low) else f"95 % interval {low:.4g} … {high:.4g}"
 
 
 def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
-    """Frequency in Hz of the first crossing of 1/√2, up to twenty times ``top``; NaN where there is none."""
-    grid = np.geomspace(1e-3 * top, 20.0 * top, 2000)
+    """Frequency in Hz of the first crossing of 1/√2, up to ``_REACH`` times ``top``; NaN where there is none."""
+    grid = np.geomspace(1e-3 * top, _REACH * top, 2000)
 
     def over(f: Any) -> Any:
         at = np.atleast_1d(np.asarray(f, dtype=np.float64))
@@ -100,9 +116,8 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
     return float(crossing)
 
 
-def _bandwidth(axis: str, diagnosis: TransferDiagnosis, points: Points) -> FigureValue:
+def _bandwidth(axis: str, diagnosis: TransferDiagnosis, top: float) -> FigureValue:
     """The −3 dB frequency of the model, and its interval over every model that the points do not exclude."""
-    top = float(points.conditions.frequency.max())
     value, error = _bandwidth_with_error(diagnosis.extended, top)
     if not np.isfinite(value):
         note = "the model does not fall by 3 dB; sweep to higher frequencies"
@@ -112,7 +127,8 @@ def _bandwidth(axis: str, diagnosis: TransferDiagnosis, points: Points) -> Figur
     low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
     error = max(error, (value - low) / 1.96, (high - value) / 1.96)
     if error > IDENTIFIED_SHARE * value or value > 2.5 * top or len(ends) < len(found):
-        note = f"not identified by these points to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep higher"
+        low, high, known = _interval(low, high, (0.0, _REACH * top))
+        note = f"not identified by these points to {top:.4g} Hz: {known}; sweep higher"
         return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, low, high)
     return FigureValue("sweep_bandwidth_hz", axis, value, error, low, high)
 
