@@ -44,6 +44,7 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
         stray = [effects for effects in stray if not set(told.names) & set(effects)]
     said = [(set(g["effects"]), g.get("units") or [], g.get("dwells") or []) for g in groups]
     said += _blocked(document)
+    found = all(any(_agrees(told, *one) for one in said) for told in made.faults) if made.faults else None
     return {
         "adequate": document["adequate"],
         "named": [g["effects"] for g in groups],
@@ -51,12 +52,15 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
         "unexplained": document["unexplained"] is not None,
         "left_out": _left_out(made, document),
         "blocked": [(b["fault"], b["units"], b["dwells"]) for b in document["blocked_by"]],
-        "found": all(any(_agrees(told, *one) for one in said) for told in made.faults) if made.faults else None,
+        "found": found,
         "false": [(sorted(one[0]), *one[1:]) for one in said if not any(_agrees(told, *one) for told in made.faults)],
         "first": bool(groups) and bool(own & set(groups[0]["effects"])),
         "outside": bool(own & set(OUTSIDE)),
         "held": all(any(name in g["effects"] for g in groups) for name in own) if own - set(OUTSIDE) else None,
-        "alone": len(physics) == len(own) and not any(g.get("scope") in DATA for g in groups) if own else None,
+        # beside a fault of the data that is there its class is right, and no other one is
+        "alone": len(physics) == len(own) and found is not False and len(groups) - len(physics) <= len(made.faults)
+        if own
+        else None,
         "p": document["error"]["p_value"],
         "hidden": [list(own)],
         "first_p": [g["p_value"] for g in groups],
