@@ -152,17 +152,12 @@ class Run:
         return entry
 
     def refuse_edited(self) -> None:
-        """Refuse a sealed run whose start or a manifest is not as the chain sealed it; ``verify`` looks at everything."""
-        own, mark = f"runs/{self.id}/", self.path / SEALED
-        number = files.read_json(mark).get("entry") if mark.is_file() else 0
-        path = hash_chain.path_of_entry(self.archive.root, number if isinstance(number, int) else 0)
-        sealed = files.read_json(path)["files"] if number else {}
-        if f"{own}{START}" not in sealed and (number or f"{own}{START}" in hash_chain.sealed_names(self.archive.root)):
-            sealed = {
-                f"{own}{SEALED}": "that of this run"
-            }  # no file has this hash: the seal was taken away or exchanged
-        for name, expected in sealed.items():
-            if name.startswith(own) and self._hash_of(name.removeprefix(own)) != expected:
+        """Refuse a run that is not as the chain sealed it: its start and its manifests; ``verify`` looks at everything."""
+        own, number = f"runs/{self.id}/", files.read_json(self.path / SEALED).get("entry")
+        entry = hash_chain.path_of_entry(self.archive.root, number if isinstance(number, int) else 0)
+        sealed = files.read_json(entry)["files"]
+        for name in (own + START, *sealed):
+            if name.startswith(own) and self._hash_of(name.removeprefix(own)) != sealed.get(name):
                 raise ArchiveUnusable(
                     f"archive: {name} differs from what the chain of the archive sealed, a run as it was sealed is needed; "
                     f"restore it from a copy, see 'tumbleline verify {self.id}'"

@@ -223,7 +223,7 @@ def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> Non
 def _plausible(frame: pd.DataFrame, where: str) -> None:
     if frame.empty:
         return  # a run whose units were all refused: who judges it says that nothing is left
-    _inside(frame.drop(columns="n", errors="ignore"), where)  # which has its own check
+    _inside(frame, where)
     if FORCE_COLUMNS[0] in frame.columns:
         size = float(np.median(np.linalg.norm(frame[list(FORCE_COLUMNS)].to_numpy(dtype=np.float64), axis=1)))
         if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
@@ -244,13 +244,7 @@ def _inside(frame: pd.DataFrame, where: str) -> None:
 
 
 def _countable(frame: pd.DataFrame, where: str) -> None:
-    """Refuse means of no samples, outputs in an unknown unit, and dwells that all have the same time."""
-    if "n" in frame.columns:
-        count = np.asarray(frame["n"], dtype=np.float64)
-        bad = np.flatnonzero((count < 1.0) | (count > values.BOUNDS["n"][1]))
-        if bad.size:
-            found = f"row {bad[0] + 1}, column n: found {count[bad[0]]:g}"
-            raise DataRejected(f"{where}: {found}, a mean of 1 or more samples is needed; correct it")
+    """Refuse outputs in an unknown unit, and dwells that all have the same time."""
     if "out_unit" in frame.columns:
         unknown = sorted({str(value) for value in frame["out_unit"].dropna()} - {*tables.OUTPUT_UNITS})
         if unknown:

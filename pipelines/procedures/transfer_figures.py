@@ -250,8 +250,8 @@ def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") 
         size = with_uncertainty(fit.sensitivity, 2.0 * abs(fit.sensitivity) * fit.sensitivity_error)
         out.append(("figures", f"sensitivity {size}{f' {output}' if output else ''} per g, {', '.join(known)} (k = 2)"))
     if diagnosis.unexplained:
-        without = (*names, *(WORD[name] for name in ("delay_s",) if fit.has(name)))
-        out.append(("not determined", f"{', '.join(without)}: {values[0].note}"))
+        delay = ", delay" if fit.has("delay_s") else ""
+        out.append(("not determined", f"{', '.join(names)}{delay}: {values[0].note}"))
     elif not values[0].identified:  # of the parameters the diagnosis says it
         out.append(("not determined", f"{names[0]}: {values[0].note}"))
     turned = (

@@ -98,7 +98,7 @@ DWELLS: list[tuple[Change, str]] = [
     (lambda t: t.assign(time_s=t.time_s * 1e300), r"column time_s: found 1e\+301"),
     (lambda t: t.assign(out_x=t.out_x > 0.0), "column 'out_x' holds true and false"),
     (lambda t: t.assign(hum=1e200), r"column hum: found 1e\+200"),
-    (lambda t: t.assign(n=[100, 100, 0, 100]), "row 3, column n: found 0, a mean of 1 or more samples"),
+    (lambda t: t.assign(n=[100, 100, 0, 100]), "row 3, column n: found 0, 1 or more is needed"),
     (lambda t: t.assign(out_unit="parsec"), r"column out_unit: found 'parsec', one of V, LSB, g, m/s\^2 is needed"),
     (lambda t: t.assign(time_s=5.0), "column time_s: all 4 dwells of unit A1 at 5 s"),
 ]
