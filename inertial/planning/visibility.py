@@ -155,9 +155,7 @@ class _Remainder:
 def _span(state: State, base: Sequence[str], white: Array | None = None) -> Array:
     """Orthonormal bases of the base model's columns per axis, (3, n, p); of the whitened columns where a whitener is given."""
     sensor, _ = design.split(base or _BASE)
-    columns = np.zeros((len(state.axes), state.time.size, 0))
-    if sensor:  # none in a base of effects of the station alone
-        columns = design.local_columns(sensor, state, design.starting_values(sensor, state))
+    columns = design.local_columns(sensor, state, design.starting_values(sensor, state))
     return _basis(_unit(columns if white is None else white @ columns), 1e-9)
 
 

@@ -90,17 +90,12 @@ def refuse_other_procedures(run: Run, wanted: str) -> None:
     if not imported and (not kinds or "multi_position" in kinds):
         return
     found = "a dynamic test was imported" if imported else f"it measured {', '.join(dict.fromkeys(kinds))}"
-    points = imported and "procedure_figures" not in run.tables()
-    shown = (
-        "points: 'tumbleline show {0} procedure_points'"
-        if points
-        else "figures: 'tumbleline show {0} procedure_figures'"
-    )
+    shown = "points" if imported and "procedure_figures" not in run.tables() else "figures"
     remedy = "import one" if imported else "list it in a recipe's procedures and measure"
     raise WrongUse(
         f"run {run.id} has no {wanted}: {found}, and they come from the multi-position test; {remedy}. What this run found, "
         "and whether the models of its procedures are adequate: "
-        f"'tumbleline show {run.id} procedure_findings'; its {shown.format(run.id)}"
+        f"'tumbleline show {run.id} procedure_findings'; its {shown}: 'tumbleline show {run.id} procedure_{shown}'"
     )
 
 
