@@ -135,11 +135,9 @@ def command(
         raise WrongUse(f"import: --set {other[0]} is for records at rest, --procedure is given; leave it out")
     if procedure and not units:
         raise WrongUse(f"import: no serial number, --procedure {procedure} needs one; add --units SN")
-    if procedure and waveforms:
-        layout = (listed, stated_units, rate, given.get("group", ""))
-        _waveforms(files, procedure, file, units, layout, archive, device, as_json=as_json)
     if procedure:
-        _transfer(files, units, effects, (listed, stated_units, file), archive, device, as_json=as_json)
+        said = (listed, stated_units, rate, given.get("group", ""))
+        _tests(files, procedure, file, units, said, effects, archive, device, waveforms=waveforms, as_json=as_json)
     from pipelines.diagnosis.import_document import import_document
 
     keys: dict[str, Any] = mapped.from_file(file) if file else {}
@@ -184,62 +182,47 @@ def _settings(given: list[str] | None) -> tuple[Path | None, dict[str, Any]]:
     return (Path(files[0]) if files else None), keys
 
 
-def _transfer(
+def _tests(
     files: list[Path],
-    unit: str,
-    effects: str,
-    stated: tuple[str, str, Path | None],
-    archive: str | None,
-    device: str,
-    *,
-    as_json: bool,
-) -> NoReturn:
-    """Judge, store and print transfer functions; a part failed where one is not adequate or cannot be judged.
-
-    stated : columns and units as the options have them, and the file of --set
-    """
-    from pipelines.importers.transfer import import_transfer
-    from pipelines.importers.transfer_columns import stated_layout
-
-    model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
-    layout = stated_layout(*stated)
-    device, slip = stated_device(device)
-    imported = [import_transfer(path, unit, model, archive, layout, device) for path in files]
-    for transfer in imported:
-        transfer["text"] += slip
-    document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
-    passed = all(transfer["adequate"] is True for transfer in imported)
-    conclude(document, lambda _: _print_transfers(imported), as_json=as_json, passed=passed)
-
-
-def _waveforms(
-    paths: list[Path],
     procedure: str,
     part: Path | None,
     unit: str,
     stated: tuple[str, str, float | None, str],
+    effects: str,
     archive: str | None,
     device: str,
     *,
+    waveforms: bool,
     as_json: bool,
 ) -> NoReturn:
-    """Reduce, keep and print the recordings of one unit.
+    """Judge, keep and print the recordings of one unit, or transfer functions, of one file each.
 
-    A part failed where the model is not adequate, or a figure that the recordings hold is not determined.
+    A part failed where a model is not adequate or cannot be judged, or a figure that the recordings hold is not determined.
 
     stated : columns and units as the options have them, rate in Hz, group
     """
     from pipelines.importers.mapping import pairs
+    from pipelines.importers.transfer import import_transfer
+    from pipelines.importers.transfer_columns import stated_layout
     from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 
     columns, units, rate, group = stated
-    layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
     device, slip = stated_device(device)
-    imported = import_waveforms(paths, procedure, part, unit, layout, archive, device)
-    imported["text"] += slip
-    held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
-    passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
-    conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
+    if waveforms:
+        layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
+        imported = import_waveforms(files, procedure, part, unit, layout, archive, device)
+        imported["text"] += slip
+        held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
+        passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
+        conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
+    model = [effect.strip() for effect in (effects or "second_order,delay").split(",")]
+    points = stated_layout(columns, units, part)
+    transfers = [import_transfer(path, unit, model, archive, points, device) for path in files]
+    for transfer in transfers:
+        transfer["text"] += slip
+    document = dict(transfers[0]) if len(transfers) == 1 else {"imports": transfers}
+    passed = all(transfer["adequate"] is True for transfer in transfers)
+    conclude(document, lambda _: _print_transfers(transfers), as_json=as_json, passed=passed)
 
 
 def _say_kept(imported: Mapping[str, Any], units: Sequence[str], what: str) -> None:

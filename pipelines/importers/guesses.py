@@ -121,7 +121,7 @@ def guesses(content: Content, serial: str = "") -> Guesses:
 def _timed_anew(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> str:
     """The labels at each of which the time begins anew, as at the next unit of a table of dwells; empty where there are none."""
     label = _column(guessed, "dwell")
-    if not label or label in numeric or _column(guessed, "unit"):
+    if label in numeric or _column(guessed, "unit"):
         return ""
     inside = named_columns.of_one_unit(table, label)
     steps = [np.diff(numbers) for name, numbers in numeric.items() if _TIME.search(name)]
@@ -131,8 +131,7 @@ def _timed_anew(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[st
 def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess], serial: str) -> Flags:
     """Note the columns whose name tells; which steps from row to row (n − 1,) stay in one unit."""
     reason = "the time begins anew at each" if serial else "its name"
-    serial = serial or named_columns.serials(table)
-    if serial:
+    if serial := serial or named_columns.serials(table):
         guessed[serial] = Guess("unit", reason)
     for name, meaning in named_columns.MEANING_OF.items():
         sound = name in numeric and name != serial and bool(np.isfinite(numeric[name]).all())

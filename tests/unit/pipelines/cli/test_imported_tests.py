@@ -79,6 +79,14 @@ def test_a_channel_of_the_other_sign_is_named_as_that_and_compared_with_nothing(
     assert "CANNOT BE JUDGED" in text
 
 
+def test_a_recording_that_is_given_twice_is_refused_whatever_its_name(tmp_path: Path) -> None:
+    command, path, *words = shock(tmp_path, half_sine(), SCALE * felt(half_sine()))
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(Path(path).read_bytes())
+    assert "copy.csv: the same bytes, each recording is needed once" in refused(command, path, copy, *words)
+    assert not (tmp_path / "archive" / "runs").exists()
+
+
 def test_a_second_pulse_is_told_and_enters_no_figure(tmp_path: Path) -> None:
     twice = half_sine() + half_sine(18.0, 0.055)
     words = shock(tmp_path, twice, SCALE * felt(twice))
