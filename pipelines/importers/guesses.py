@@ -121,11 +121,10 @@ def guesses(content: Content, serial: str = "") -> Guesses:
 def _timed_anew(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> str:
     """The labels at each of which the time begins anew, as at the next unit of a table of dwells; empty where there are none."""
     label = _column(guessed, "dwell")
-    if label in numeric or _column(guessed, "unit"):
-        return ""
     inside = named_columns.of_one_unit(table, label)
     steps = [np.diff(numbers) for name, numbers in numeric.items() if _TIME.search(name)]
-    return label if not inside.all() and any(np.array_equal(step > 0.0, inside) for step in steps) else ""
+    anew = not inside.all() and any(np.array_equal(step > 0.0, inside) for step in steps)
+    return label if anew and label not in numeric and not _column(guessed, "unit") else ""
 
 
 def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess], serial: str) -> Flags:
