@@ -56,7 +56,7 @@ def local_columns(effects: Sequence[SensorEffect], state: State, values: Values)
     """Columns of the sensor's effects, (..., m, n, p), g per unit of the coefficient; p counts the same on each of the m axes."""
     axes = [[e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects] for axis in state.axes]
     # columns that all units share are repeated where others differ from unit to unit
-    shapes = {c.shape[:-1] for columns in axes for c in columns}
+    shapes = {c.shape[:-1] for columns in axes for c in columns} or {state.time.shape}
     *batch, n = shapes.pop() if len(shapes) == 1 else np.broadcast_shapes(*shapes)
     # in memory one column after another: written across the rows of a large lot they take four times as long
     design = np.empty((*batch, len(axes), sum(c.shape[-1] for c in axes[0]), n))

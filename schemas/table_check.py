@@ -81,7 +81,7 @@ def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
         index = frame.index[int(np.flatnonzero(twice.to_numpy())[0])]
         named = ", ".join(f"{column} {frame[column].loc[index]}" for column in table.key)
         raise DataRejected(
-            f"{source}: row {index}: {named} is there twice, it may be there once; remove one of the two"
+            f"{source}: row {index + 1}: {named} is there twice, it may be there once; remove one of the two"
         )
 
 
@@ -99,7 +99,7 @@ def _explain(problem: "SchemaError", frame: pd.DataFrame, source: str) -> str:
 
 def _row(frame: pd.DataFrame, index: Any) -> str:
     unit = f" (unit {frame['unit'].loc[index]})" if "unit" in frame.columns else ""
-    return f"row {index}{unit}"
+    return f"row {index + 1}{unit}"
 
 
 @cache

@@ -154,7 +154,7 @@ def found_duration(record: Array, rate_hz: float) -> tuple[float, float]:
     if abs(by_foot / duration - 1.0) > _ALIKE:
         raise NotIdentified(
             f"shock: the pulse is no half sine: by its width at 10 % of the peak it lasts {1e3 * by_foot:.3g} ms, at 50 % "
-            f"{1e3 * duration:.3g} ms; state duration_ms, or look at the mounting"
+            f"{1e3 * duration:.3g} ms, with {duration * rate_hz:.0f} samples; look at the mounting, or sample faster"
         )
     return by_foot, max(start / rate_hz - 0.5 * by_foot, 0.0)
 

@@ -151,6 +151,18 @@ class Run:
         files.publish(mark, files.json_bytes({"entry": entry, "files": sealed, "stages": stages_of(self.path)}))
         return entry
 
+    def refuse_edited(self) -> None:
+        """Refuse a run that is not as the chain sealed it: its start and its manifests; ``verify`` looks at everything."""
+        own, number = f"runs/{self.id}/", files.read_json(self.path / SEALED).get("entry")
+        entry = hash_chain.path_of_entry(self.archive.root, number if isinstance(number, int) else 0)
+        sealed = files.read_json(entry)["files"]
+        for name in (own + START, *sealed):
+            if name.startswith(own) and self._hash_of(name.removeprefix(own)) != sealed.get(name):
+                raise ArchiveUnusable(
+                    f"archive: {name} differs from what the chain of the archive sealed, a run as it was sealed is needed; "
+                    f"restore it from a copy, see 'tumbleline verify {self.id}'"
+                )
+
     def has_report(self, key: str) -> bool:
         """Whether the report is there, made with this key."""
         return self.report.is_file() and self._manifest_key("report") == key

@@ -251,13 +251,21 @@ def main() -> None:
         _leave(str(problem), UNUSABLE)
     except SystemExit as left:
         if left.code == INTERRUPTED:
-            goes_on = sys.argv[1:2] in (["run"], ["investigate"])
-            _leave(f"stopped; give the command again{' to continue the run' if goes_on else ''}", INTERRUPTED)
+            _stopped()
         if left.code == 1 and isinstance(left.__context__, OSError) and left.__context__.errno == errno.EPIPE:
             sys.exit(PIPE_CLOSED)  # status 1 is a verdict
         raise
     except Exception as problem:  # noqa: BLE001 - a defect: one line, details in a file, never exit status 1
+        # pydantic makes an exception of its own of Ctrl-C, with the name of the other in its text alone
+        if "KeyboardInterrupt" in repr((problem, problem.__cause__, problem.__context__)):
+            _stopped()
         _unexpected(problem)
+
+
+def _stopped() -> None:
+    """End after Ctrl-C."""
+    goes_on = sys.argv[1:2] in (["run"], ["investigate"])
+    _leave(f"stopped; give the command again{' to continue the run' if goes_on else ''}", INTERRUPTED)
 
 
 def _unexpected(problem: Exception) -> None:

@@ -133,11 +133,11 @@ def command(
     waveforms = procedure != "sweep" or any(channel in mapped.pairs(listed, "--map") for channel in WAVEFORMS)
     if procedure and (other := sorted(given.keys() - ({"group"} if waveforms else set()))):
         raise WrongUse(f"import: --set {other[0]} is for records at rest, --procedure is given; leave it out")
-    if procedure and waveforms:
-        layout = (listed, stated_units, rate, given.get("group", ""))
-        _waveforms(files, procedure, file, units, layout, archive, device, as_json=as_json)
+    if procedure and not units:
+        raise WrongUse(f"import: no serial number, --procedure {procedure} needs one; add --units SN")
     if procedure:
-        _transfer(files, units, effects, (listed, stated_units, file), archive, device, as_json=as_json)
+        said = (listed, stated_units, rate, given.get("group", ""))
+        _tests(files, procedure, file, units, said, effects, archive, device, waveforms=waveforms, as_json=as_json)
     from pipelines.diagnosis.import_document import import_document
 
     keys: dict[str, Any] = mapped.from_file(file) if file else {}
@@ -182,99 +182,68 @@ def _settings(given: list[str] | None) -> tuple[Path | None, dict[str, Any]]:
     return (Path(files[0]) if files else None), keys
 
 
-def _transfer(
+def _tests(
     files: list[Path],
-    unit: str,
-    effects: str,
-    stated: tuple[str, str, Path | None],
-    archive: str | None,
-    device: str,
-    *,
-    as_json: bool,
-) -> NoReturn:
-    """Judge, store and print transfer functions; a part failed where one is not adequate or cannot be judged.
-
-    stated : columns and units as the options have them, and the file of --set
-    """
-    from pipelines.importers.transfer import import_transfer
-    from pipelines.importers.transfer_columns import stated_layout
-
-    if not unit:
-        raise WrongUse("import: no serial number, a transfer function needs one; add --units SN")
-    model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
-    layout = stated_layout(*stated)
-    device, slip = stated_device(device)
-    imported = [import_transfer(path, unit, model, archive, layout, device) for path in files]
-    for transfer in imported:
-        transfer["text"] += slip
-    document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
-    passed = all(transfer["adequate"] is True for transfer in imported)
-    conclude(document, lambda _: _print_transfers(imported), as_json=as_json, passed=passed)
-
-
-def _waveforms(
-    paths: list[Path],
     procedure: str,
     part: Path | None,
     unit: str,
     stated: tuple[str, str, float | None, str],
+    effects: str,
     archive: str | None,
     device: str,
     *,
+    waveforms: bool,
     as_json: bool,
 ) -> NoReturn:
-    """Reduce, keep and print the recordings of one unit.
+    """Judge, keep and print the recordings of one unit, or transfer functions, of one file each.
 
-    A part failed where the model is not adequate, or a figure that the recordings hold is not determined.
+    A part failed where a model is not adequate or cannot be judged, or a figure that the recordings hold is not determined.
 
     stated : columns and units as the options have them, rate in Hz, group
     """
     from pipelines.importers.mapping import pairs
+    from pipelines.importers.transfer import import_transfer
+    from pipelines.importers.transfer_columns import stated_layout
     from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 
-    if not unit:
-        raise WrongUse("import: no serial number, the recordings of a test need one; add --units SN")
     columns, units, rate, group = stated
-    layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
     device, slip = stated_device(device)
-    imported = import_waveforms(paths, procedure, part, unit, layout, archive, device)
-    imported["text"] += slip
-    held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
-    passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
-    conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
+    if waveforms:
+        layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
+        imported = import_waveforms(files, procedure, part, unit, layout, archive, device)
+        imported["text"] += slip
+        held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
+        passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
+        conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
+    model = [effect.strip() for effect in (effects or "second_order,delay").split(",")]
+    points = stated_layout(columns, units, part)
+    transfers = [import_transfer(path, unit, model, archive, points, device) for path in files]
+    for transfer in transfers:
+        transfer["text"] += slip
+    document = dict(transfers[0]) if len(transfers) == 1 else {"imports": transfers}
+    passed = all(transfer["adequate"] is True for transfer in transfers)
+    conclude(document, lambda _: _print_transfers(transfers), as_json=as_json, passed=passed)
 
 
-def _named(units: Sequence[str], device: str | None) -> str:
-    """The units of an import with their kind of device, where it is stated."""
+def _say_kept(imported: Mapping[str, Any], units: Sequence[str], what: str) -> None:
+    """Print the units of an import, with their kind of device where it is stated, what was kept of them, and as which run."""
     listed = ", ".join(units) if len(units) <= 8 else f"{len(units)} units, {units[0]} to {units[-1]}"
-    return listed + (f" ({device})" if device else "")
+    device = f" ({imported['device']})" if imported["device"] else ""
+    say(f"{listed}{device}: {what}, kept as run {imported['run']}")
 
 
 def _print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
     for transfer in imports:
-        say(
-            f"{_named([transfer['unit']], transfer['device'])}: {transfer['points']} points, kept as run {transfer['run']}"
-        )
+        _say_kept(transfer, [transfer["unit"]], f"{transfer['points']} points")
         for line in transfer["text"]:
             say(f"  {line}")
         print_verdict_of_fit(transfer["adequate"], "the model does not describe these points")
 
 
 def _print_waveforms(imported: Mapping[str, Any]) -> None:
-    say(
-        f"{_named([imported['unit']], imported['device'])}: {imported['records']} recordings, kept as run {imported['run']}"
-    )
-    rows = [
-        [
-            figure["figure"],
-            figure["axis"],
-            short(figure["value"]),
-            short(figure["uncertainty"]),
-            figure["unit"],
-        ]
-        for figure in imported["figures"]
-        if figure["identified"]
-    ]
+    _say_kept(imported, [imported["unit"]], number_of(imported["records"], "recording"))
+    found = [figure for figure in imported["figures"] if figure["identified"]]
+    rows = [[f["figure"], f["axis"], short(f["value"]), short(f["uncertainty"]), f["unit"]] for f in found]
     if rows:
         print_table(["figure", "axis", "value", "standard uncertainty", "unit"], rows, fixed=2)
     for line in imported["text"]:
@@ -289,7 +258,7 @@ def _print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: ob
         dwells = number_of(imported["dwells"], "dwell")
         rows = f"{number_of(imported['samples'], 'sample')}, {dwells}" if imported["samples"] else dwells
         unit = imported["out_unit"] or "a unit that is not known (--unit-of output=… states it)"
-        say(f"{_named(imported['units'], imported['device'])}: {rows} in {unit}, kept as run {imported['run']}")
+        _say_kept(imported, imported["units"], f"{rows} in {unit}")
         for remark in [*imported["remarks"], *imported["lines"]]:
             say(f"  {remark}")
         if list_dwells:

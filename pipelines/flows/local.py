@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.archive import Archive, Run, code_hash
-from pipelines.archive.files import ELSEWHERE, writing
+from pipelines.archive.files import ELSEWHERE, TEMPORARY, publish, writing
 from pipelines.chain.attendance import Operator
 from pipelines.chain.chain import BY_NAME, ORDER
 from pipelines.chain.runner import Done
@@ -43,6 +43,8 @@ from schemas.progress import Progress
 
 POLL_S = 0.1
 PRIVATE = 0o600
+PROBE = f"{TEMPORARY}database"
+DATABASE_BYTES = 2**21  # a new database has 1.6 MB after its first run
 NEEDED = (
     "pipelines.flows.calibrate",
     "pipelines.orchestrator.dead_runs",
@@ -224,6 +226,8 @@ def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
             missing = missing_in(log_path.read_bytes()[before:].decode("utf-8", errors="replace"))
             if missing is not None:
                 raise TumblelineError(f"orchestrator: {missing}")
+            publish(home / PROBE, bytes(DATABASE_BYTES))  # refuses a full disk, where a log has no room for the reason
+            (home / PROBE).unlink()
             status = process.poll()
             found = f"does not answer after {STARTUP_S} s" if status is None else f"ended with status {status}"
             raise StationTimeout(f"orchestrator: its server {found}; read {log_path}, or run with --direct")

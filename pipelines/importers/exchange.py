@@ -90,17 +90,12 @@ def refuse_other_procedures(run: Run, wanted: str) -> None:
     if not imported and (not kinds or "multi_position" in kinds):
         return
     found = "a dynamic test was imported" if imported else f"it measured {', '.join(dict.fromkeys(kinds))}"
-    points = imported and "procedure_figures" not in run.tables()
-    shown = (
-        "points: 'tumbleline show {0} procedure_points'"
-        if points
-        else "figures: 'tumbleline show {0} procedure_figures'"
-    )
+    shown = "points" if imported and "procedure_figures" not in run.tables() else "figures"
     remedy = "import one" if imported else "list it in a recipe's procedures and measure"
     raise WrongUse(
         f"run {run.id} has no {wanted}: {found}, and they come from the multi-position test; {remedy}. What this run found, "
         "and whether the models of its procedures are adequate: "
-        f"'tumbleline show {run.id} procedure_findings'; its {shown.format(run.id)}"
+        f"'tumbleline show {run.id} procedure_findings'; its {shown}: 'tumbleline show {run.id} procedure_{shown}'"
     )
 
 
@@ -180,7 +175,7 @@ def _require(frame: pd.DataFrame, names: Iterable[str], where: str) -> None:
 def _units(frame: pd.DataFrame, where: str, *, foreign: bool) -> list[str]:
     names = ["" if pd.isna(value) else values.text(value) for value in frame["unit"].tolist()]
     if "" in names:
-        raise DataRejected(f"{where}: row {names.index('')}, column unit: empty, a name is needed; fill it in")
+        raise DataRejected(f"{where}: row {names.index('') + 1}, column unit: empty, a name is needed; fill it in")
     if foreign:
         refuse_unusable_serials(dict.fromkeys(names), f"{where}: column unit", _CORRECT)
     return names
@@ -194,7 +189,7 @@ def _numbers(frame: pd.DataFrame, column: str, where: str) -> Array:
     needed = (*REQUIRED, *OUTPUT_COLUMNS, *FORCE_COLUMNS, *ANGLE_COLUMNS)
     if bad.size and not (column not in needed and bool(np.all(pd.isna(frame[column])))):
         row = int(bad[0])
-        cell = f"row {row} (unit {frame['unit'].iloc[row]}), column {shown(column)}"
+        cell = f"row {row + 1} (unit {frame['unit'].iloc[row]}), column {shown(column)}"
         raise DataRejected(
             f"{where}: {cell}: found {shown(frame[column].iloc[row])}, a finite number is needed ({bad.size} such rows); "
             "measure again, or leave the row or the column out"
@@ -206,7 +201,7 @@ def _dwell_numbers(frame: pd.DataFrame, where: str) -> Index:
     numbers = np.asarray(frame["dwell"], dtype=np.float64)
     bad = np.flatnonzero((numbers != np.rint(numbers)) | (numbers < 0) | (numbers > values.BOUNDS["dwell"][1]))
     if bad.size:
-        found = f"row {bad[0]}, column dwell: found {numbers[bad[0]]}"
+        found = f"row {bad[0] + 1}, column dwell: found {numbers[bad[0]]}"
         raise DataRejected(f"{where}: {found}, a whole number from 0 on is needed; correct it")
     return numbers.astype(np.int64)
 
@@ -223,7 +218,7 @@ def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> Non
 def _plausible(frame: pd.DataFrame, where: str) -> None:
     if frame.empty:
         return  # a run whose units were all refused: who judges it says that nothing is left
-    _inside(frame.drop(columns="n", errors="ignore"), where)  # which has its own check
+    _inside(frame, where)
     if FORCE_COLUMNS[0] in frame.columns:
         size = float(np.median(np.linalg.norm(frame[list(FORCE_COLUMNS)].to_numpy(dtype=np.float64), axis=1)))
         if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
@@ -240,17 +235,11 @@ def _inside(frame: pd.DataFrame, where: str) -> None:
     """Refuse impossible numbers in any column."""
     for column in frame.columns:
         if pd.api.types.is_numeric_dtype(frame[column]):
-            values.refuse_outside(np.asarray(frame[column], dtype=np.float64), str(column), where, first_row=0)
+            values.refuse_outside(np.asarray(frame[column], dtype=np.float64), str(column), where)
 
 
 def _countable(frame: pd.DataFrame, where: str) -> None:
-    """Refuse means of no samples, outputs in an unknown unit, and dwells that all have the same time."""
-    if "n" in frame.columns:
-        count = np.asarray(frame["n"], dtype=np.float64)
-        bad = np.flatnonzero((count < 1.0) | (count > values.BOUNDS["n"][1]))
-        if bad.size:
-            found = f"row {bad[0]}, column n: found {count[bad[0]]:g}"
-            raise DataRejected(f"{where}: {found}, a mean of 1 or more samples is needed; correct it")
+    """Refuse outputs in an unknown unit, and dwells that all have the same time."""
     if "out_unit" in frame.columns:
         unknown = sorted({str(value) for value in frame["out_unit"].dropna()} - {*tables.OUTPUT_UNITS})
         if unknown:

@@ -39,8 +39,11 @@ class SourceFile:
 
 
 def digest_of(sources: Sequence[SourceFile]) -> str:
-    """The hash of several files that are read as a single source."""
-    return hashlib.sha256("".join(source.sha256 for source in sources).encode()).hexdigest()
+    """The hash of several files that are read as a single source; one recording twice is refused, it would count twice."""
+    hashes = [source.sha256 for source in sources]
+    if twice := dict.fromkeys(source.path for source in sources if hashes.count(source.sha256) > 1):
+        raise DataRejected(f"{' and '.join(twice)}: the same bytes, each recording is needed once; leave out one")
+    return hashlib.sha256("".join(hashes).encode()).hexdigest()
 
 
 def is_file(source: str | Path) -> bool:

@@ -92,12 +92,15 @@ def _column(guessed: dict[str, Guess], meaning: str) -> str:
     return next((name for name, guess in guessed.items() if guess.meaning == meaning), "")
 
 
-def guesses(content: Content) -> Guesses:
-    """Guesses of what the columns of a file mean, by names, units and numbers."""
+def guesses(content: Content, serial: str = "") -> Guesses:
+    """Guesses of what the columns of a file mean, by names, units and numbers.
+
+    serial : the column of serial numbers, where more than its name shows it
+    """
     table = content.table
     guessed: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
     numeric = {str(name): numbers for name in table.columns if (numbers := _numbers(table[name])) is not None}
-    inside = _named(table, numeric, guessed)
+    inside = _named(table, numeric, guessed, serial)
     _time(content, numeric, guessed, inside)
     found = triads.Triad() if _single_axis(numeric, guessed) else _axes(content, numeric, guessed)
     _others(content, table, numeric, guessed)
@@ -105,6 +108,8 @@ def guesses(content: Content) -> Guesses:
     positions = not _column(guessed, "time") and triads.are_positions(found.sphere, len(table))
     rows = Guesses(guessed, Guess("", ""), Guess("", ""), sheet or positions, found)
     if rows.dwells:
+        if timed := _timed_anew(table, numeric, guessed):
+            return guesses(content, timed)
         _of_dwells(numeric, guessed, inside)
     time_unit = _time_unit(content, numeric, guessed, dwells=rows.dwells)
     few = _few_axes(content, numeric, guessed)
@@ -113,11 +118,20 @@ def guesses(content: Content) -> Guesses:
     return replace(rows, time_unit=time_unit, output=output, few=few)
 
 
-def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> Flags:
+def _timed_anew(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> str:
+    """The labels at each of which the time begins anew, as at the next unit of a table of dwells; empty where there are none."""
+    label = _column(guessed, "dwell")
+    inside = named_columns.of_one_unit(table, label)
+    steps = [np.diff(numbers) for name, numbers in numeric.items() if _TIME.search(name)]
+    anew = not inside.all() and any(np.array_equal(step > 0.0, inside) for step in steps)
+    return label if anew and label not in numeric and not _column(guessed, "unit") else ""
+
+
+def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess], serial: str) -> Flags:
     """Note the columns whose name tells; which steps from row to row (n − 1,) stay in one unit."""
-    serial = named_columns.serials(table)
-    if serial:
-        guessed[serial] = Guess("unit", "its name")
+    reason = "the time begins anew at each" if serial else "its name"
+    if serial := serial or named_columns.serials(table):
+        guessed[serial] = Guess("unit", reason)
     for name, meaning in named_columns.MEANING_OF.items():
         sound = name in numeric and name != serial and bool(np.isfinite(numeric[name]).all())
         if sound and name not in named_columns.OF_DWELLS:

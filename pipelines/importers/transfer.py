@@ -60,7 +60,7 @@ def import_transfer(
         p = diagnosis.parameter(name)
         parameters[name] = {
             "value": p.value, "uncertainty": p.uncertainty, "low": p.low, "high": p.high, "unit": unit_of,
-            "identified": p.identified,
+            "identified": p.identified and not diagnosis.unexplained,
         }  # fmt: skip
     text = [
         *([("columns", recognised)] if recognised else []),

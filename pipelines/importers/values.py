@@ -116,7 +116,7 @@ def _has_flags(values: pd.Series) -> bool:
     return values.dtype == object and any(isinstance(value, bool | np.bool_) for value in values)
 
 
-def refuse_outside(values: Array, column: str, where: str, *, label: str = "", first_row: int = 1) -> None:
+def refuse_outside(values: Array, column: str, where: str, *, label: str = "") -> None:
     """Refuse impossible values, with row, value and bounds; gaps count as possible.
 
     Parameters
@@ -130,9 +130,9 @@ def refuse_outside(values: Array, column: str, where: str, *, label: str = "", f
         return
     row = int(bad[0])
     unit = f" {_UNITS[kind]}" if column in BOUNDS and (kind := column.rsplit("_", 1)[-1]) in _UNITS else ""
-    needed = f"0{unit} or more" if low == 0.0 and high >= LARGEST_TIME_S else f"{low:g} to {high:g}{unit}"
+    needed = f"{low:g}{unit} or more" if low in {0.0, 1.0} and high >= LARGEST_TIME_S else f"{low:g} to {high:g}{unit}"
     raise DataRejected(
-        f"{where}: row {row + first_row}, column {shown(label or column)}: found {values[row]:g}, {needed} is needed; "
+        f"{where}: row {row + 1}, column {shown(label or column)}: found {values[row]:g}, {needed} is needed; "
         "correct it, or its unit"
     )
 

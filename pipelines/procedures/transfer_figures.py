@@ -227,7 +227,7 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
         if p.log and not parameter.identified:
             text = f"{p.name}: 95 % interval {parameter.low:.4g} … {parameter.high:.4g} {p.unit}"
             out.append(("not identified", text.removesuffix(" 1")))
-        elif p.name == "delay_s":
+        elif p.name == "delay_s" and not diagnosis.unexplained:
             text = f"{1e6 * parameter.value:.2f} µs, 95 % interval {1e6 * parameter.low:.2f} … {1e6 * parameter.high:.2f} µs"
             if parameter.rival is not None:
                 *_, low, high = diagnosis.extended.of(p.name)
@@ -266,7 +266,8 @@ def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") 
         size = with_uncertainty(fit.sensitivity, 2.0 * abs(fit.sensitivity) * fit.sensitivity_error)
         out.append(("figures", f"sensitivity {size}{f' {output}' if output else ''} per g, {', '.join(known)} (k = 2)"))
     if diagnosis.unexplained:
-        out.append(("not determined", f"{', '.join(names)}: {values[0].note}"))
+        delay = ", delay" if fit.has("delay_s") else ""
+        out.append(("not determined", f"{', '.join(names)}{delay}: {values[0].note}"))
     elif not values[0].identified:  # of the parameters the diagnosis says it
         out.append(("not determined", f"{names[0]}: {values[0].note}"))
     turned = (

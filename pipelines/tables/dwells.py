@@ -327,8 +327,9 @@ def _white_error(readings: Readings, scale: Array, output: Array) -> Array:
     """White standard errors (units, n, 3) in g: sd/√n where recorded, else from the scatter about a plain fit."""
     if readings.spread is not None and readings.count is not None:
         error = readings.spread / np.sqrt(np.maximum(readings.count, 1.0)[..., None]) / scale[:, None, :]
-        typical = np.nanmedian(np.where(error > 0.0, error, np.nan), axis=1, keepdims=True)
-        typical = np.where(np.isfinite(typical), typical, np.nanmax(typical) if np.isfinite(typical).any() else 1e-6)
+        some = (error > 0.0).any(axis=1, keepdims=True)
+        typical = np.nanmedian(np.where(error > 0.0, error, np.where(some, np.nan, 0.0)), axis=1, keepdims=True)
+        typical = np.where(some, typical, typical.max() or 1e-6)
         return np.where(np.isfinite(error) & (error > 0.2 * typical), error, typical)
     spread = np.sqrt(np.nanmean(readings.misfit**2, axis=1, keepdims=True))
     pooled = np.sqrt(np.mean(spread**2, axis=0, keepdims=True))

@@ -30,7 +30,7 @@ CASES = {
     "release whatif --json": ["release", "whatif", "{folder}/model.toml"],
     "import FILE --procedure sweep": ["import", "{folder}/sweep.csv", "--procedure", "sweep", "--units", "S1"],
     "import FILE… --procedure NAME --map reference=…": [
-        "import", *["{folder}/step.csv"] * 4, "--units", "S1", "--procedure", "step_response",
+        "import", *(f"{{folder}}/step{n}.csv" for n in range(4)), "--units", "S1", "--procedure", "step_response",
         "--map", "z=out [V],reference=drive [V]", "--rate", "50000",
     ],
     "doctor --json": ["doctor"],
@@ -69,8 +69,10 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "units.csv").write_text("serial,wafer\nA1,W1\n", encoding="utf-8")
     rng = np.random.default_rng(1)
     time = np.arange(1000) / 50e3 - 0.003
-    step = np.column_stack([0.3 * step_response(time, 900.0, 0.6) + 1e-4 * rng.normal(size=1000), 2.0 * (time > 0.0)])
-    np.savetxt(folder / "step.csv", step, delimiter=",", header="out [V],drive [V]", comments="")
+    for n in range(4):
+        output = 0.3 * step_response(time, 900.0, 0.6) + 1e-4 * rng.normal(size=1000)
+        step = np.column_stack([output, 2.0 * (time > 0.0)])
+        np.savetxt(folder / f"step{n}.csv", step, delimiter=",", header="out [V],drive [V]", comments="")
     f = np.geomspace(5.0, 4000.0, 30)
     h = -transfer(f, 2500.0, 0.7)
     rows = [f"{a:.6g},{abs(b):.6g},{np.degrees(np.angle(b)):.6g},0.2,0.2" for a, b in zip(f, h, strict=True)]

@@ -1,8 +1,10 @@
 """What an installation lacks is said with its name and the remedy; how the orchestrator starts from it, and leaves."""
 
+import errno
 import fcntl
 import importlib
 import os
+import shutil
 import sqlite3
 import stat
 import subprocess
@@ -16,12 +18,13 @@ import orchestrator
 import pytest
 from each import each
 
+from pipelines.archive import files
 from pipelines.flows import local
 from pipelines.orchestrator import server
 from pipelines.orchestrator.new_database import NAME, make_database
 from pipelines.orchestrator.settings import DATABASE
 from pipelines.workbench.services import work
-from schemas.errors import TumblelineError
+from schemas.errors import ArchiveUnusable, TumblelineError
 from schemas.installed import not_installed
 
 START = "import sys; sys.modules[{missing!r}] = None; sys.argv[0] = 'tumbleline'; from pipelines.__main__ import main; main()"
@@ -103,6 +106,18 @@ def test_a_server_that_ends_at_its_start_says_which_library_it_lacks(
     status, told = LAST_LINES[last]
     assert caught.value.exit_status == status
     assert str(caught.value).startswith(told)
+
+
+def test_a_server_that_ends_on_a_full_disk_is_told_by_the_folder_and_its_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, _: bytes) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
+    monkeypatch.setattr(files, "_write_durably", full)
+    with pytest.raises(ArchiveUnusable, match=r"cannot be written \(No space left .*free space is needed"):
+        local._start(tmp_path, lambda: None)
 
 
 def test_a_server_whose_folder_is_gone_or_whose_clients_have_gone_leaves(

@@ -16,6 +16,7 @@ from each import each
 from in_process import given
 from ledger_events import event
 from lots import lot
+from pydantic import BaseModel, model_serializer
 from root_process import ROOT
 
 from pipelines.archive import Archive, files
@@ -138,6 +139,20 @@ def test_ctrl_c_in_a_capture_says_that_it_goes_on_and_it_does(tmp_path: Path) ->
     assert "give the command again to continue the run" in message
     assert "Traceback" not in message
     assert list(archive.rglob(".tmp-*")) == []
+
+
+def test_ctrl_c_that_a_library_hands_on_as_an_error_of_its_own_is_no_defect(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    class Held(BaseModel):
+        @model_serializer
+        def held(self) -> str:
+            raise KeyboardInterrupt
+
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path))
+    monkeypatch.setattr("pipelines.importers.files.read_content", lambda *_: Held().model_dump())
+    assert given("import", "a.csv", *MAPPED) == (130, "", "tumbleline: stopped; give the command again\n")
+    assert list(tmp_path.iterdir()) == []
 
 
 # -- what a verdict says -------------------------------------------------------------------------------------------------

@@ -83,11 +83,11 @@ def test_records_that_cannot_be_are_refused_and_leave_nothing(row: tuple[Change,
 SERIALS = ("..", "=cmd|x", "АВС1", "A/1", "x" * 65)
 DWELLS: list[tuple[Change, str]] = [
     (lambda t: t.drop(columns="time_s"), "column time_s is missing"),
-    (lambda t: t.assign(out_x=[0.1, np.nan, 0.1, 0.1]), r"row 1 \(unit A1\), column out_x: found nan"),
-    (lambda t: t.assign(hum=[1.0, 2.0, np.inf, 3.0]), "row 2 .*column hum: found inf"),
+    (lambda t: t.assign(out_x=[0.1, np.nan, 0.1, 0.1]), r"row 2 \(unit A1\), column out_x: found nan"),
+    (lambda t: t.assign(hum=[1.0, 2.0, np.inf, 3.0]), "row 3 .*column hum: found inf"),
     (lambda t: t.assign(dwell=[0, 1, 1, 2]), "is there twice"),
     (lambda t: t.assign(dwell=[0, 1, 1.5, 2]), "found 1.5, a whole number"),
-    (lambda t: t.assign(unit=["A1", "", "A1", "A1"]), "row 1, column unit: empty"),
+    (lambda t: t.assign(unit=["A1", "", "A1", "A1"]), "row 2, column unit: empty"),
     (lambda t: t.assign(unit=" "), "column unit: empty"),
     *((lambda t, serial=serial: t.assign(unit=serial), "column unit: serial") for serial in SERIALS),
     (lambda t: t.assign(outer_deg=0.0), "outer_deg without inner_deg"),
@@ -98,7 +98,7 @@ DWELLS: list[tuple[Change, str]] = [
     (lambda t: t.assign(time_s=t.time_s * 1e300), r"column time_s: found 1e\+301"),
     (lambda t: t.assign(out_x=t.out_x > 0.0), "column 'out_x' holds true and false"),
     (lambda t: t.assign(hum=1e200), r"column hum: found 1e\+200"),
-    (lambda t: t.assign(n=[100, 100, 0, 100]), "row 2, column n: found 0, a mean of 1 or more samples"),
+    (lambda t: t.assign(n=[100, 100, 0, 100]), "row 3, column n: found 0, 1 or more is needed"),
     (lambda t: t.assign(out_unit="parsec"), r"column out_unit: found 'parsec', one of V, LSB, g, m/s\^2 is needed"),
     (lambda t: t.assign(time_s=5.0), "column time_s: all 4 dwells of unit A1 at 5 s"),
 ]

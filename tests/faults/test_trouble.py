@@ -95,6 +95,6 @@ def test_a_station_that_delivers_no_time_is_refused(tmp_path: Path) -> None:
     double = CaptureDouble()
     samples, readings, history = double.record(job, 0, "dwell", 0, 0.0, job.recipe.poses[0])
     samples.loc[5, "time_s"] = np.nan
-    with pytest.raises(DataRejected, match=r"samples: row 5 \(unit A1\), column time_s"):
+    with pytest.raises(DataRejected, match=r"samples: row 6 \(unit A1\), column time_s"):
         records.put(0, samples, readings, history, b"")
     assert records.finished() == set()

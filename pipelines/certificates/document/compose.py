@@ -150,6 +150,7 @@ def _refuse(run: Run, calibration: Calibration) -> None:
             "is made of it; measure the unit again"
         )
     refuse_changed(run, calibration)
+    run.refuse_edited()
 
 
 def _coefficient(row: Row) -> content.Coefficient:

@@ -19,7 +19,7 @@ def dwells(**changes: object) -> pd.DataFrame:
 
 
 REFUSED = [
-    *(({column: [1.0, bad]}, rf"row 1 \(unit A2\), column {column}: found {bad}")
+    *(({column: [1.0, bad]}, rf"row 2 \(unit A2\), column {column}: found {bad}")
       for bad in (np.nan, np.inf, -np.inf) for column in ("out_x", "time_s", "unit_C")),
     ({"unit": ["A1", "A1"]}, "unit A1, dwell 0 is there twice"),
     ({"out_y": [1.0, "many"]}, "found many"),

@@ -52,6 +52,11 @@ def test_a_closed_loop_hides_only_what_is_wider_than_itself() -> None:
     assert [v.unseen_ranges for v in per_effect] == [(), ()]  # effects without parameters
 
 
+def test_a_base_of_the_station_alone_hides_no_effect_of_the_sensor() -> None:
+    (bias,) = visibilities(soaked((0.0, 40.0)), ["level_error"], 1e-6, ["bias"])
+    assert bias.remaining_fraction == pytest.approx(1.0)
+
+
 THERMAL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
 UNITS, DWELL_S, RATE = 100, 5.0, 10.0
 

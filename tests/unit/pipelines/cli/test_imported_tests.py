@@ -1,5 +1,6 @@
 """Recordings of dynamic tests by the command that a user types: what is printed, and with which status it ends."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,22 @@ def test_a_channel_of_the_other_sign_is_named_as_that_and_compared_with_nothing(
     text = text_of(*shock(tmp_path, half_sine(), -SCALE * felt(half_sine())), status=1)
     assert "its sign is turned over" in text
     assert "CANNOT BE JUDGED" in text
+
+
+def test_a_recording_that_is_given_twice_is_refused_whatever_its_name(tmp_path: Path) -> None:
+    command, path, *words = shock(tmp_path, half_sine(), SCALE * felt(half_sine()))
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(Path(path).read_bytes())
+    assert "copy.csv: the same bytes, each recording is needed once" in refused(command, path, copy, *words)
+    assert not (tmp_path / "archive" / "runs").exists()
+
+
+def test_a_pulse_of_a_few_samples_is_refused_with_their_number(tmp_path: Path) -> None:
+    command, path, *words = shock(tmp_path, half_sine(duration_s=0.011), SCALE * half_sine(duration_s=0.011))
+    head, *rows = Path(path).read_text().splitlines()
+    Path(path).write_text("\n".join([head, *rows[::125]]))  # 400 Hz
+    told = refused(command, path, *words)
+    assert re.search(r"the pulse is no half sine: .* with 4 samples; look at the mounting, or sample faster", told)
 
 
 def test_a_second_pulse_is_told_and_enters_no_figure(tmp_path: Path) -> None:

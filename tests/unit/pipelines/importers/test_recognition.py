@@ -429,6 +429,22 @@ def test_columns_named_as_in_the_exchange_format_serials_and_numbers_of_dwells_a
     assert recognise([tmp_path / "unnumbered.csv"]).open == ()  # each unit has a clock of its own
 
 
+def test_labels_at_which_the_time_begins_anew_are_units_whatever_they_are_called(rng: Rng, tmp_path: Path) -> None:
+    file = dwells_of_units(rng).rename(columns={"unit": "Prüfling", "dwell": "Lage", "time_s": "Zeit [s]"})
+    file.drop(columns=["slot", "since_power_s", "since_move_s", "duration_s"]).to_csv(tmp_path / "lot.csv", index=False)
+    seen = recognise([tmp_path / "lot.csv"])
+    assert seen.keys is not None
+    found = {meaning: seen.keys["columns"].get(meaning) for meaning in ("unit", "time", "dwell")}
+    assert found == {"unit": "Prüfling", "time": "Zeit [s]", "dwell": None}
+    dwells = imported(file, build(seen.keys, "t"), "lot.csv").dwells
+    assert dwells is not None
+    assert sorted(set(dwells["unit"])) == ["S1", "S2", "S3"]
+    whole = file.assign(**{"Zeit [s]": np.arange(len(file)) * 60.0}).rename(columns={"Prüfling": "Kammer"})
+    whole.to_csv(tmp_path / "soaks.csv", index=False)  # one clock throughout: the labels may be those of soaks
+    seen = recognise([tmp_path / "soaks.csv"])
+    assert "unit" not in (seen.keys or {"columns": {}})["columns"]
+
+
 def test_names_of_the_exchange_format_in_a_record_of_samples_are_no_dwells(rng: Rng, tmp_path: Path) -> None:
     hand = Hand(rng)
     columns = {"n": np.arange(hand.n), "unit": np.repeat("mg", hand.n), "time_s": hand.time}

@@ -45,6 +45,16 @@ def test_the_missing_pole_is_named_the_error_falls_and_the_command_says_so_by_it
     assert diagnosis["recommended"]
 
 
+def test_of_points_that_scatter_far_beyond_their_stated_uncertainties_no_parameter_is_stated(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv")
+    path.write_text(path.read_text().replace(",0.2,0.15", ",0.0002,0.00015"))
+    words = ("import", path, "--procedure", "sweep", "--units", "S1", "--archive", tmp_path / "archive")
+    diagnosis = document_of(*words, status=1)
+    assert not any(parameter["identified"] for parameter in diagnosis["parameters"].values())
+    (told,) = (line for line in diagnosis["text"] if "delay" in line and not line.startswith("model:"))
+    assert told.startswith("not determined: bandwidth, natural frequency, damping ratio, delay: the model, also with")
+
+
 @each([
     ("f,h", "1,2", r"no column is recognised as frequency, magnitude, phase .* --map frequency=…,magnitude=…,phase=…"),
     ("frequency_hz,magnitude,phase", "1,2,0", r"column 'phase' has no unit, one of deg, rad is needed; add --unit-of phase=…"),

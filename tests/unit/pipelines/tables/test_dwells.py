@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pipelines.tables.dwells import lot_arrays
+from pipelines.tables.dwells import lot_arrays, lot_of, measured
 from pipelines.tables.frames import ByUnit
 
 UNITS, DWELLS = ("A1", "B2", "C3"), 5
@@ -66,3 +66,18 @@ def test_rows_of_a_unit_are_found_together_and_scattered(rng: np.random.Generato
         np.testing.assert_array_equal(ByUnit(mixed).of(unit)["out_x"], mixed[mixed["unit"] == unit]["out_x"])
     assert ByUnit(table).units == list(UNITS)
     assert len(ByUnit(table).of("elsewhere")) == len(ByUnit(table.iloc[:0]).of("A1")) == 0
+
+
+def test_a_scatter_of_zero_is_none_and_that_of_the_other_units_counts(rng: np.random.Generator) -> None:
+    force = rng.normal(size=(24, 3))
+    table = pd.DataFrame(
+        {"unit": np.repeat(UNITS, 24), "dwell": np.tile(np.arange(24), 3), "time_s": np.tile(np.arange(24.0), 3)}
+    )
+    table = table.assign(kind="dwell", pose="p", out_unit="g", slot=0, n=100, sd_x=1e-3, sd_y=1e-3, sd_z=2e-3)
+    for axis, letter in enumerate("xyz"):
+        table[f"force_{letter}"] = table[f"out_{letter}"] = np.tile(force[:, axis], 3)
+    table.loc[table["unit"] == "B2", ["sd_x", "sd_y", "sd_z"]] = 0.0
+    error = lot_of(measured(table)).error
+    np.testing.assert_allclose(error[1], 2e-4)
+    np.testing.assert_allclose(error[0], np.tile([1e-4, 1e-4, 2e-4], (24, 1)))
+    np.testing.assert_allclose(lot_of(measured(table.assign(sd_x=0.0, sd_y=0.0, sd_z=0.0))).error, 1e-6)

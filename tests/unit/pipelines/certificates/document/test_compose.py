@@ -130,6 +130,23 @@ def test_a_certificate_has_the_same_bytes_again_and_none_is_made_of_what_has_or_
     assert re.search(r"certificate A1/1 of run .* was revoked \(dropped\)", refused(*typed("A1")))
 
 
+@pytest.mark.parametrize(
+    ("name", "before", "after"),
+    [("run", "simulated", "hardware"), ("budget", "sha256", "sha265"), ("sealed", '"entry": 1', '"entry": 9')],
+)
+def test_no_document_is_made_of_a_run_that_was_edited_after_it_was_certified(
+    run: Run, typed: Typed, tmp_path: Path, name: str, before: str, after: str
+) -> None:
+    path = run.path / f"{name}.json"
+    text = path.read_text(encoding="utf-8")
+    assert before in text
+    path.write_text(text.replace(before, after), encoding="utf-8")
+    assert "restore" in refused(*typed("A1"), status=2)
+    path.unlink()
+    assert "restore" in refused(*typed("A1"), status=2)
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 def test_an_amendment_an_accreditation_and_an_interval_that_the_customer_agreed_to_are_on_paper_and_not_without_them(
     run: Run, xml: bytes, paper: bytes, monkeypatch: pytest.MonkeyPatch
