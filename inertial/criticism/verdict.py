@@ -179,6 +179,12 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
             drivers.append(curved.driver)
             beside = curved.model
     sound = passed is True and not searched.added and unexplained is None and run.drift is None
+    gross = rms > GROSS and not (unjudged or named_data or searched.added or unexplained)
+    if gross:
+        unjudged = (
+            f"the residual is larger than the noise of any usable sensor ({GROSS:g} g): the outputs do not follow the recorded "
+            "poses; check that they belong together, and the unit of the outputs"
+        )
     return Verdict(
         run=run,
         search=search,
@@ -192,7 +198,7 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
         floor=_samples(run) or (final.floor() if unexplained is None else min(final.floor(), unexplained.floor)),
         log_p=min(log_p, *_decided(searched, unexplained, search.field.looks)),
         sound=sound,
-        adequate=False if named_data or run.contradicted else None if unjudged else sound,
+        adequate=False if named_data or run.contradicted or gross else None if unjudged else sound,
         unjudged=unjudged,
     )
 

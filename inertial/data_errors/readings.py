@@ -17,6 +17,9 @@ _WARM = 2.5
 FAR_G = 0.02
 """Misfit, g, above which a dwell may be in another pose: more than a device's gain changes between two soaks."""
 
+_FOLLOWS_G = 0.3
+"""Median misfit, g, from which an output does not follow the poses: in poses of other rows it is 0.4 to 1, in noise more."""
+
 _ROUNDS = 12  # of reweighting
 _TUKEY = 4.685
 """Widths of the biweight: 95 % efficiency under normal noise (Holland & Welsch, Commun. Stat. A6 (1977) 813)."""
@@ -102,6 +105,12 @@ class Readings:
     def scale(self) -> Array:
         """Typical output per g of every unit, (units,): the root of the mean squared response."""
         return np.sqrt(np.sum(self.fits[:, :, 1:] ** 2, axis=(1, 2)) / len(self.axes))
+
+    @cached_property
+    def follows(self) -> Flags:
+        """Whether the output of each unit follows its poses, (units,); else its response says nothing about the unit."""
+        follows: Flags = np.nanmedian(np.linalg.norm(self.misfit, axis=-1), axis=1) < _FOLLOWS_G
+        return follows
 
     @cached_property
     def without_bias_slope(self) -> "Readings":

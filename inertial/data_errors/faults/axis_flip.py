@@ -14,6 +14,8 @@ def flipped(readings: Readings) -> Iterator[Fault]:
     axes = np.array(readings.axes)
     orders = np.array(list(permutations(range(3), axes.size)))
     for unit, fit in enumerate(readings.fits):
+        if not readings.follows[unit]:
+            continue
         k = fit[:, 1:] / max(float(readings.scale[unit]), 1e-300)
         rows = np.arange(len(k))
         columns = orders[np.argmax(np.abs(k)[rows, orders].sum(axis=1))]

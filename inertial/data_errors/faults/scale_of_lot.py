@@ -20,7 +20,7 @@ def scale_units(readings: Readings) -> Iterator[Fault]:
     near = (ratios > 0.75) & (ratios < 1.33)
     if scale.size > 2 and 2 * np.count_nonzero(near) <= scale.size:
         return
-    for unit in np.flatnonzero(~near).tolist():
+    for unit in np.flatnonzero(~near & readings.follows).tolist():
         octaves = np.log2(ratios[unit])
         power_of_two = abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4
         evidence = f"scale is {ratios[unit]:.4g} times that of the lot"

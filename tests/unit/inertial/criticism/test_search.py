@@ -100,6 +100,15 @@ def test_poses_that_contradict_the_outputs_are_told_and_nothing_else(wrong: str)
     assert wrong in (found["reason"] or "")
 
 
+def test_outputs_that_follow_no_pose_are_told_and_not_left_to_a_probability() -> None:
+    dwells, rng = make(World(units=3), 6).dwells, np.random.default_rng(4)
+    columns = [f"out_{axis}" for axis in "xyz"]
+    dwells[columns] = rng.normal(0.0, 0.3, (len(dwells), 3))
+    found = diagnosed(dwells)
+    assert (found["adequate"], found["classes"], found["unexplained"]) == (False, [], None)
+    assert "the outputs do not follow the recorded poses" in (found["reason"] or "")
+
+
 def test_a_saw_tooth_of_every_unit_is_a_course_over_time_and_no_change_of_single_units() -> None:
     lot, phase = lot_in(make(World(), 7)), np.linspace(0.0, 0.9, 8)[:, None, None]
     saw = 4e-4 * ((lot.state.time[..., None] / 2500.0 + phase) % 1.0 - 0.5)
