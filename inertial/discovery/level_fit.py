@@ -68,8 +68,8 @@ class LevelFit:
     Parameters
     ----------
     sums : of the driver over these lots · here : indices of the h hypotheses of the effect, axis by axis
-    correlations : (h, h) each, of the columns within lots, in the means of lots, and the inverse of those of the driver without
-        what lots do not separate
+    correlations : (h, h) each, of the columns within lots, in the means of lots; inverses without what lots do not separate, of
+        those that apply to the driver, and in the means of lots
     stated : weigh the units by the noise they state, as the scores of names do, so that no chi-square by it is left
     """
 
@@ -79,13 +79,13 @@ class LevelFit:
         sums: DriverSums,
         here: Places,
         axes: int,
-        correlations: tuple[Array, Array, Array],
+        correlations: tuple[Array, Array, Array, Array],
         *,
         stated: bool = False,
     ) -> None:
         count = np.array([len(lot.units) for lot in lots])
         self._lot = np.repeat(np.arange(len(lots)), count)
-        self._inside, self._between, self._inner = correlations
+        self._inside, self._between, *self._inner = correlations
         cells: list[tuple[Array, Array, Array]] = []
         for lot, first in zip(lots, np.cumsum(count) - count, strict=True):
             weights = sums.weights(lot)
@@ -100,7 +100,9 @@ class LevelFit:
         # what the lots of a station have in common is no size of a level, unless the driver is just that
         self._common = csr_array(np.eye(len(stations))[at] * (sums.driver not in {MEAN, STATION}))
         self._blocks = _blocks_of(at)
-        self._noise = sums.noise[0] if not sums.inside_only else np.inf, sums.noise[1]
+        # what is not measured has infinite noise: means of lots by slot, and units of a lot that has one
+        between, within = sums.noise
+        self._noise = np.inf if sums.inside_only else between, within if np.isfinite(within) else np.inf
         own = np.concatenate([lot.own[:, here] for lot in lots])
         self._own = own if stated else _weights(lots, here, axes)
         score = np.concatenate([lot.score[:, here] for lot in lots]) * over(self._own, own)
@@ -173,7 +175,10 @@ class LevelFit:
             if product <= _CLOSE * first:
                 break
             moved = self._gradient(*self._predicted(step))
-            length = product / max(float((step * moved).sum()), 1e-300)
+            curvature = float((step * moved).sum())
+            if curvature <= 0.0:
+                break
+            length = product / curvature
             x, left = x + length * step, left - length * moved
             near = self._near(left)
             step, product = near + float((left * near).sum()) / product * step, float((left * near).sum())
@@ -181,7 +186,9 @@ class LevelFit:
 
     def _near(self, left: Array) -> Array:
         """Solution without the ties between levels."""
-        return self._roots * ((self._roots * left) @ self._inner)
+        scaled = self._roots * left
+        parts = (scaled[: self.levels] @ self._inner[0], scaled[self.levels :] @ self._inner[1])
+        return self._roots * np.concatenate(parts)
 
 
 def _weights(lots: Sequence[ScoredLot], here: Places, axes: int) -> Array:

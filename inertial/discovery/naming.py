@@ -203,7 +203,8 @@ class Pool:
     def _fit(self, lots: Sequence[ScoredLot], sums: DriverSums, *effects: str, stated: bool = False) -> LevelFit:
         """The normal equations of effects by a driver, which has the sums over the lots."""
         here = self.everywhere(*effects)
-        among = self._within(*effects), self.lot[np.ix_(here, here)], self._inner(sums, *effects)
+        of_means = self.lot[np.ix_(here, here)]
+        among = self._within(*effects), of_means, self._inner(sums, *effects), _inverse(of_means)
         return LevelFit(lots, sums, here, self.axes, among, stated=stated)
 
     def _within(self, *effects: str) -> Array:
@@ -343,8 +344,7 @@ class Pool:
         effect would seem to explain three times the actual chi-square.
         """
         here = self.everywhere(*effects)
-        among = self._within(*effects) if sums.mixed else self.lot[np.ix_(here, here)]
-        return np.linalg.pinv(among, rcond=_SEEN, hermitian=True).astype(np.float64)
+        return _inverse(self._within(*effects) if sums.mixed else self.lot[np.ix_(here, here)])
 
     def score(self, sums: DriverSums, effect: str) -> float:
         """Score of an effect for a driver: the reduction of chi-square by its columns less the price of their coefficients."""
@@ -419,6 +419,11 @@ class Pool:
             errors=np.where(errors > 0.0, errors, np.inf),
             square=(mean / self.axes, deviation / self.axes),
         )
+
+
+def _inverse(products: Array) -> Array:
+    """Pseudo-inverse of correlations, without combinations that are not seen."""
+    return np.linalg.pinv(products, rcond=_SEEN, hermitian=True).astype(np.float64)
 
 
 def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float) -> set[int]:
