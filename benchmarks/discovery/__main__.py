@@ -19,7 +19,8 @@ from scipy import stats
 
 from benchmarks.discovery.archives import ArchiveMaker, Hidden, Setting
 from benchmarks.discovery.cost import cost
-from benchmarks.discovery.lots import WORLDS, World, bank
+from benchmarks.discovery.lots import FLOOR_UG, WORLDS, World, bank
+from inertial.discovery.level_fit import WIDE
 from inertial.discovery.naming import Name, Pool, Unnamed
 
 BANK = 120
@@ -134,30 +135,41 @@ def names(given: argparse.Namespace) -> None:
     ):
         hits = sum(one[place] for one in told)
         print(f"{name}: {hits} of {len(told)} {_interval(hits, len(told))}")
+    pulls = np.array([one[6] for one in told if np.isfinite(one[6])])
+    inside = int(np.count_nonzero(np.abs(pulls) <= WIDE))
+    print(f"size within its interval: {inside} of {pulls.size} {_interval(inside, pulls.size)}")
+    print(f"pulls of the squared size: mean {pulls.mean():.2f}, rms {np.sqrt(np.mean(pulls**2)):.2f}")
     for (_, _, hidden), one in zip(parts, told, strict=True):
         if not one[1] or not one[3] or one[4]:
             print(f"  {hidden.effect} by {hidden.driver}: {one[5]}")
 
 
-def _names(part: tuple[int, int, Hidden]) -> tuple[bool, bool, bool, bool, bool, str]:
+def _names(part: tuple[int, int, Hidden]) -> tuple[bool, bool, bool, bool, bool, str, float]:
     told = _told(part)
     if told is None:
-        return False, False, False, False, False, "nothing found"
-    found, unnamed, hidden = *told, part[2]
+        return False, False, False, False, False, "nothing found", np.nan
+    found, unnamed, true, hidden = *told, part[2]
     right = [one for one in found if hidden.effect in one.effects]
     driver = any(hidden.driver in one.drivers for one in right)
     first = any(one.effects[0] == hidden.effect for one in right)
-    return True, bool(right), first, driver, len(found) > len(right[:1]) or bool(unnamed), _words(told)
+    square, deviation = right[0].square if driver else (np.nan, 1.0)
+    pull = float((square - true) / deviation)
+    return True, bool(right), first, driver, len(found) > len(right[:1]) or bool(unnamed), _words(*told[:2]), pull
 
 
-def _told(part: tuple[int, int, Hidden]) -> tuple[list[Name], list[Unnamed]] | None:
-    """Names of an archive, and functions of the pose that none of them is; None where nothing was found."""
+def _told(part: tuple[int, int, Hidden]) -> tuple[list[Name], list[Unnamed], float] | None:
+    """Names of an archive, functions of the pose that none of them is, and the true mean square, g²; None: nothing found.
+
+    What differs is about its mean over the units.
+    """
     seed, own, hidden = part
     maker = _maker(WORLDS[1], seed)
     result = maker.archive(own, 1000, hidden, Setting(), keep=True)
     if not result.first:
         return None
-    return Pool(maker.products).names(result.lots, result.alarms, maker.state_of(result.evidence).least_needed())
+    size = 1e-6 * FLOOR_UG * np.concatenate(result.hidden)
+    true = float(np.mean((size - (0.0 if hidden.driver == "mean" else size.mean(axis=0))) ** 2))
+    return *Pool(maker.products).names(result.lots, result.alarms, maker.state_of(result.evidence).least_needed()), true
 
 
 def unexplained(given: argparse.Namespace) -> None:
@@ -169,16 +181,15 @@ def unexplained(given: argparse.Namespace) -> None:
     ]
     told = _map(_told, parts, given.jobs)
     there = [(part[2].driver, one) for part, one in zip(parts, told, strict=True) if one is not None]
-    said = sum(any(one.driver == driver for one in unnamed) for driver, (_, unnamed) in there)
-    named = sum(bool(names) for _, (names, _) in there)
+    said = sum(any(one.driver == driver for one in unnamed) for driver, (_, unnamed, _) in there)
+    named = sum(bool(names) for _, (names, *_) in there)
     for text, hits in (("found", len(there)), ("said to be like no effect", said), ("an effect named, too", named)):
         print(f"{text}: {hits} of {len(told)} {_interval(hits, len(told))}")
     for (_, _, hidden), one in zip(parts, told, strict=True):
-        print(f"  {hidden.driver}:", "nothing" if one is None else _words(one))
+        print(f"  {hidden.driver}:", "nothing" if one is None else _words(*one[:2]))
 
 
-def _words(told: tuple[list[Name], list[Unnamed]]) -> str:
-    found, unnamed = told
+def _words(found: list[Name], unnamed: list[Unnamed]) -> str:
     texts = [f"{' | '.join(one.effects)} by {' | '.join(one.drivers)}" for one in found]
     return "; ".join([*texts, *(f"a function of the pose by {one.driver}" for one in unnamed)])
 

@@ -86,7 +86,7 @@ class LevelFit:
         count = np.array([len(lot.units) for lot in lots])
         self._lot = np.repeat(np.arange(len(lots)), count)
         self._inside, self._between, *self._inner = correlations
-        cells: list[tuple[Array, Array, Array]] = []
+        cells: list[tuple[Array, Places, Places]] = []
         for lot, first in zip(lots, np.cumsum(count) - count, strict=True):
             weights = sums.weights(lot)
             unit, level = np.nonzero(weights)
@@ -106,10 +106,10 @@ class LevelFit:
         own = np.concatenate([lot.own[:, here] for lot in lots])
         self._own = own if stated else _weights(lots, here, axes)
         score = np.concatenate([lot.score[:, here] for lot in lots]) * over(self._own, own)
-        total, stated = self._by_lot @ self._own, np.array([lot.information[here] for lot in lots])
+        total, of_lots = self._by_lot @ self._own, np.array([lot.information[here] for lot in lots])
         self._share = self._own / np.maximum(total, 1e-300)[self._lot]
-        self._information = stated * over(total, self._by_lot @ own)
-        self._sums = (self._by_lot @ score) * (stated > 0.0)
+        self._information = of_lots * over(total, self._by_lot @ own)
+        self._sums = (self._by_lot @ score) * (of_lots > 0.0)
         self._left = score - self._share * (self._by_lot @ score)[self._lot]
         own_sums = sums.information[:, here], self._common.T @ self._information / self._noise[0]
         self._roots = over(1.0, np.sqrt(np.maximum(np.concatenate(own_sums), 0.0)))
@@ -207,7 +207,7 @@ def _weights(lots: Sequence[ScoredLot], here: Places, axes: int) -> Array:
     return np.clip(alike, own / _PLAN, own * _PLAN)
 
 
-def _blocks_of(stations: Array) -> Array:
+def _blocks_of(stations: Places) -> Places:
     """Number of the block of each lot: consecutive lots of a station."""
     out, next_ = np.zeros(stations.size, dtype=np.intp), 0
     for station in range(int(stations.max()) + 1):

@@ -237,7 +237,7 @@ class Discoveries:
         """Sizes of columns of the station, common to all lots, or by station about their mean."""
         lots, by = [station for _, station in self._both], MEAN if driver == MEAN else STATION
         alone = np.eye(len(columns))
-        return LevelFit(lots, gathered(lots, [by])[by], np.array(columns), 1, (alone,) * 4).solved()
+        return LevelFit(lots, gathered(lots, [by])[by], np.array(columns), 1, (alone, alone, alone, alone)).solved()
 
     def _station_levels(self, driver: str, columns: Sequence[int]) -> tuple[Array, Array, Array]:
         """Coefficients of columns of the station: common (p,), of each station about it, and standard errors (stations, p)."""
