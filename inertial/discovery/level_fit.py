@@ -131,6 +131,11 @@ class LevelFit:
         drawn = np.array([self._levels_of(each) for each in errors]).reshape(draws, self.levels, sizes.shape[1])
         return LevelSizes(self._levels_of(sizes), self._inflation * drawn, self)
 
+    @property
+    def stated_variance(self) -> Array:
+        """Variance (levels, h) of the sizes by the noise that the scores are divided by."""
+        return self._roots[: self.levels] ** 2 * np.diag(self._inner[0])
+
     def scatter_of(self, direction: Array) -> float:
         """Standard deviation of Σ direction·size, (levels, h), by the scatter between blocks of lots."""
         if self._about:

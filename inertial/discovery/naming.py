@@ -26,7 +26,6 @@ _MOST = 6
 _ROUNDS = 3
 """Number of fits of the effects of each driver beside those of the others, where there are several names."""
 
-_DRAWS = 10  # of errors, for the shrinkage of levels
 
 _INEXACT = 0.02
 """Relative uncertainty of a score: products of columns are means over lots, parameters are at the middle of their range."""
@@ -242,11 +241,10 @@ class Pool:
     def _taken(self, lots: Sequence[ScoredLot], driver: str, *effects: str) -> tuple[Sequence[ScoredLot], Array]:
         """The lots with effects of a driver subtracted, and the sizes (levels, axes·p) that were."""
         sums = gathered(lots, [driver])[driver]
-        levels = len(sums.labels)
-        fit = self._fit(lots, sums, *effects, stated=True).solved(_DRAWS if levels > 1 else 0)
-        taken = fit.sizes
-        if levels > 1:  # sizes of levels are shrunk towards zero according to their noise
-            noise, squares = (fit.errors**2).mean(axis=0).sum(axis=1), (taken**2).sum(axis=1)
+        fit = self._fit(lots, sums, *effects, stated=True)
+        taken = fit.solved(draws=0).sizes
+        if fit.levels > 1:  # sizes of levels are shrunk towards zero according to their noise
+            noise, squares = fit.stated_variance.sum(axis=1), (taken**2).sum(axis=1)
             taken = taken * np.clip(1.0 - noise / np.maximum(squares, 1e-300), 0.0, 1.0)[:, None]
         return [self.without(lot, sums, taken, *effects) for lot in lots], taken
 
