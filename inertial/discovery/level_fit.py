@@ -19,7 +19,8 @@ from inertial.discovery.evidence import MEAN, STATION, ScoredLot
 
 _BLOCKS = 20
 """Number of blocks of consecutive lots of a station, if there are as many lots: the standard errors have a scatter of
-1/√40 = 16 %, and wander that lasts less than a block is in them."""
+1/√40 = 16 %, and wander that lasts less than a block is in them. A level has four at least, as what it explains of a block is
+no scatter."""
 
 WIDE = 2.09
 """Half width of a 95 % interval in standard deviations: Student's t of as many blocks."""
@@ -99,7 +100,7 @@ class LevelFit:
         at = np.array([stations.index(lot.station) for lot in lots])
         # what the lots of a station have in common is no size of a level, unless the driver is just that
         self._common = csr_array(np.eye(len(stations))[at] * (sums.driver not in {MEAN, STATION}))
-        self._blocks = _blocks_of(at)
+        self._blocks = _blocks_of(at, max(_BLOCKS, 4 * self.levels))
         # what is not measured has infinite noise: means of lots by slot, and units of a lot that has one
         between, within = sums.noise
         self._noise = np.inf if sums.inside_only else between, within if np.isfinite(within) else np.inf
@@ -115,7 +116,7 @@ class LevelFit:
         self._roots = over(1.0, np.sqrt(np.maximum(np.concatenate(own_sums), 0.0)))
         of_level = np.array(list(sums.units.values()), dtype=np.float64)
         self.weight = of_level / of_level.sum()
-        self._about, known = self.levels > 1, units if sums.mixed else len(lots)
+        self._about, known = self.levels > 1, units if sums.mixed else int(self._blocks.max()) + 1
         self._inflation = float(np.sqrt(known / max(known - self.levels, 1)))
 
     def solved(self, draws: int = _DRAWS, seed: int = 0) -> LevelSizes:
@@ -212,12 +213,12 @@ def _weights(lots: Sequence[ScoredLot], here: Places, axes: int) -> Array:
     return np.clip(alike, own / _PLAN, own * _PLAN)
 
 
-def _blocks_of(stations: Places) -> Places:
-    """Number of the block of each lot: consecutive lots of a station."""
+def _blocks_of(stations: Places, count: int) -> Places:
+    """Number of the block of each lot: consecutive lots of a station, about so many in all."""
     out, next_ = np.zeros(stations.size, dtype=np.intp), 0
     for station in range(int(stations.max()) + 1):
         here = np.flatnonzero(stations == station)
-        parts = np.array_split(here, max(1, min(here.size, round(_BLOCKS * here.size / stations.size))))
+        parts = np.array_split(here, max(1, min(here.size, round(count * here.size / stations.size))))
         for part in parts:
             out[part] = next_
             next_ += 1
