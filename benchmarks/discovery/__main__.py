@@ -1,4 +1,4 @@
-"""Discoveries in archives: ``python -m benchmarks.discovery [null|power|names|unexplained|cost] [--archives N] [--seed S]``.
+"""Discoveries in archives: ``python -m benchmarks.discovery null|power|names|sizes|unexplained|cost [--archives N] [--seed S]``.
 
 Prints for each world how many archives without anything hidden showed a discovery in 100 nights; for hidden effects the lots
 after which 95 % of the archives had found them; how often effect and driver were named, or the effect was said to be like none of
@@ -11,15 +11,17 @@ import argparse
 import random
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from benchmarks.discovery.archives import ArchiveMaker, Hidden, Setting
+from benchmarks.discovery.archives import ArchiveMaker, Hidden, Result, Setting
 from benchmarks.discovery.cost import cost
-from benchmarks.discovery.lots import WORLDS, World, bank
+from benchmarks.discovery.lots import FLOOR_UG, WORLDS, World, bank
+from inertial.discovery.level_fit import WIDE
 from inertial.discovery.naming import Name, Pool, Unnamed
 
 BANK = 120
@@ -50,7 +52,7 @@ _makers: dict[str, ArchiveMaker] = {}
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("null", "power", "names", "unexplained", "cost"))
+    parser.add_argument("what", choices=("null", "power", "names", "sizes", "unexplained", "cost"))
     parser.add_argument("--archives", type=int, default=20)
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**6))
     parser.add_argument("--lots", type=int, default=10_000, help="of the archive whose cost is measured")
@@ -60,7 +62,7 @@ def main() -> None:
     if given.what == "cost":
         cost(given.lots, given.seed)
         return
-    {"null": null, "power": power, "names": names, "unexplained": unexplained}[given.what](given)
+    {"null": null, "power": power, "names": names, "sizes": sizes, "unexplained": unexplained}[given.what](given)
 
 
 def _maker(world: World, seed: int) -> ArchiveMaker:
@@ -134,30 +136,75 @@ def names(given: argparse.Namespace) -> None:
     ):
         hits = sum(one[place] for one in told)
         print(f"{name}: {hits} of {len(told)} {_interval(hits, len(told))}")
+    _print_pulls([one[6] for one in told])
     for (_, _, hidden), one in zip(parts, told, strict=True):
         if not one[1] or not one[3] or one[4]:
             print(f"  {hidden.effect} by {hidden.driver}: {one[5]}")
 
 
-def _names(part: tuple[int, int, Hidden]) -> tuple[bool, bool, bool, bool, bool, str]:
+def _names(part: tuple[int, int, Hidden]) -> tuple[bool, bool, bool, bool, bool, str, float]:
     told = _told(part)
     if told is None:
-        return False, False, False, False, False, "nothing found"
-    found, unnamed, hidden = *told, part[2]
+        return False, False, False, False, False, "nothing found", np.nan
+    found, unnamed, true, hidden = *told, part[2]
     right = [one for one in found if hidden.effect in one.effects]
     driver = any(hidden.driver in one.drivers for one in right)
     first = any(one.effects[0] == hidden.effect for one in right)
-    return True, bool(right), first, driver, len(found) > len(right[:1]) or bool(unnamed), _words(told)
+    pull = _pull(right, true) if driver else np.nan
+    return True, bool(right), first, driver, len(found) > len(right[:1]) or bool(unnamed), _words(*told[:2]), pull
 
 
-def _told(part: tuple[int, int, Hidden]) -> tuple[list[Name], list[Unnamed]] | None:
-    """Names of an archive, and functions of the pose that none of them is; None where nothing was found."""
+def sizes(given: argparse.Namespace) -> None:
+    """How often the interval of a size holds what is hidden in archives of 200 lots, where the name is known."""
+    _maker(WORLDS[1], given.seed)
+    known = [hidden for hidden in NAMES if hidden.effect != "creep_after_move"]  # its column is that of another time
+    parts = [(given.seed, given.seed + k, replace(known[k % len(known)], size=0.1)) for k in range(given.archives)]
+    told = _map(_sized, parts, given.jobs)
+    _print_pulls(told)
+    for (_, _, hidden), pull in zip(parts, told, strict=True):
+        print(f"  {hidden.effect} by {hidden.driver}: {pull:.2f}")
+
+
+def _sized(part: tuple[int, int, Hidden]) -> float:
+    seed, own, hidden = part
+    maker = _maker(WORLDS[1], seed)
+    result = maker.archive(own, 200, hidden, Setting(), keep=True)
+    found, _ = Pool(maker.products).names(result.lots, {(hidden.driver, hidden.effect)}, 10.0)
+    return _pull([one for one in found if hidden.driver in one.drivers], _true_square(hidden, result))
+
+
+def _pull(names: list[Name], true: float) -> float:
+    """Deviation of the squared size of the first name from the true one over its stated standard deviation; nan: none."""
+    square, deviation = names[0].square if names else (np.nan, 1.0)
+    return float((square - true) / deviation)
+
+
+def _true_square(hidden: Hidden, result: Result) -> float:
+    """Mean square, g², of what is hidden in the units, of what differs about its mean."""
+    size = 1e-6 * FLOOR_UG * np.concatenate(result.hidden)
+    return float(np.mean((size - (0.0 if hidden.driver == "mean" else size.mean(axis=0))) ** 2))
+
+
+def _print_pulls(every: list[float]) -> None:
+    pulls = np.array([pull for pull in every if np.isfinite(pull)])
+    inside = int(np.count_nonzero(np.abs(pulls) <= WIDE))
+    print(f"size within its interval: {inside} of {pulls.size} {_interval(inside, pulls.size)}")
+    print(f"pulls of the squared size: mean {pulls.mean():.2f}, rms {np.sqrt(np.mean(pulls**2)):.2f}")
+
+
+def _told(part: tuple[int, int, Hidden]) -> tuple[list[Name], list[Unnamed], float] | None:
+    """Names of an archive, functions of the pose that none of them is, and the true mean square, g²; None: nothing found.
+
+    What differs is about its mean over the units.
+    """
     seed, own, hidden = part
     maker = _maker(WORLDS[1], seed)
     result = maker.archive(own, 1000, hidden, Setting(), keep=True)
     if not result.first:
         return None
-    return Pool(maker.products).names(result.lots, result.alarms, maker.state_of(result.evidence).least_needed())
+    needed = maker.state_of(result.evidence).least_needed()
+    found, unnamed = Pool(maker.products).names(result.lots, result.alarms, needed)
+    return found, unnamed, _true_square(hidden, result)
 
 
 def unexplained(given: argparse.Namespace) -> None:
@@ -169,16 +216,15 @@ def unexplained(given: argparse.Namespace) -> None:
     ]
     told = _map(_told, parts, given.jobs)
     there = [(part[2].driver, one) for part, one in zip(parts, told, strict=True) if one is not None]
-    said = sum(any(one.driver == driver for one in unnamed) for driver, (_, unnamed) in there)
-    named = sum(bool(names) for _, (names, _) in there)
+    said = sum(any(one.driver == driver for one in unnamed) for driver, (_, unnamed, _) in there)
+    named = sum(bool(names) for _, (names, *_) in there)
     for text, hits in (("found", len(there)), ("said to be like no effect", said), ("an effect named, too", named)):
         print(f"{text}: {hits} of {len(told)} {_interval(hits, len(told))}")
     for (_, _, hidden), one in zip(parts, told, strict=True):
-        print(f"  {hidden.driver}:", "nothing" if one is None else _words(one))
+        print(f"  {hidden.driver}:", "nothing" if one is None else _words(*one[:2]))
 
 
-def _words(told: tuple[list[Name], list[Unnamed]]) -> str:
-    found, unnamed = told
+def _words(found: list[Name], unnamed: list[Unnamed]) -> str:
     texts = [f"{' | '.join(one.effects)} by {' | '.join(one.drivers)}" for one in found]
     return "; ".join([*texts, *(f"a function of the pose by {one.driver}" for one in unnamed)])
 

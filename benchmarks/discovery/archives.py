@@ -48,10 +48,14 @@ class Setting:
 
 @dataclass
 class Result:
-    """An archive's evidence, the number of lots at the first alarm of each driver, and the effects of all alarms."""
+    """An archive's evidence, the number of lots at the first alarm of each driver, and the effects of all alarms.
+
+    hidden : what was hidden in the units of each lot, (units, 3), floors
+    """
 
     evidence: Evidence
     lots: list[ScoredLot] = field(default_factory=list[ScoredLot])
+    hidden: list[Array] = field(default_factory=list[Array])
     first: dict[str, int] = field(default_factory=dict[str, int])
     alarms: set[tuple[str, str]] = field(default_factory=set[tuple[str, str]])
 
@@ -97,11 +101,12 @@ class ArchiveMaker:
         result = Result(Evidence(3 * len(columns), earlier_in(before), numbered(columns)))
         state, own = _State(rng, setting.stations), Lots(self._world, seed)
         for number in range(count):
-            lot = self._lot(rng, state, own, number, count, hidden, setting)
+            lot, size = self._lot(rng, state, own, number, count, hidden, setting)
             result.evidence.add(lot)
             before.append(lot)
             if keep:
                 result.lots.append(lot)
+                result.hidden.append(size)
             if number % A_NIGHT == A_NIGHT - 1 and number >= 29:
                 for name, effect in self._alarmed(result.evidence):
                     result.alarms.add((name, effect))
@@ -133,13 +138,14 @@ class ArchiveMaker:
         count: int,
         hidden: Hidden,
         setting: Setting,
-    ) -> ScoredLot:
+    ) -> tuple[ScoredLot, Array]:
+        """The next lot, and what is hidden in its units, (units, 3), floors."""
         station = int(rng.integers(setting.stations))
         wafers = rng.integers(0, 12, UNITS) + 12 * (number // 200)
         radius = rng.uniform(0.0, 1.0, UNITS)
         firmware = int(number >= count // 2)
+        size = state.sizes(hidden.driver, station, wafers, radius, firmware) * hidden.size
         if hidden.driver:
-            size = state.sizes(hidden.driver, station, wafers, radius, firmware) * hidden.size
             one = own.scored(hidden.effect, size)
             score = one.score
         else:
@@ -160,7 +166,7 @@ class ArchiveMaker:
             "supplier": tuple(f"s{k}" for k in rng.integers(0, 3, UNITS)),
             "season": (f"month {(number // A_NIGHT // 30) % 12}",) * UNITS,
         }
-        return ScoredLot(
+        lot = ScoredLot(
             f"{number}",
             f"s{station}",
             number / A_NIGHT,
@@ -172,6 +178,7 @@ class ArchiveMaker:
             {"radius": radius},
             {"own temperature coefficient": np.repeat(one.tempco, len(self.products.columns), axis=1)},
         )
+        return lot, size
 
     def _change(self, one: LotScores, effect: str, size: Array) -> Array:
         """What coefficients (units, 3), in floors, add to the scores of a lot."""

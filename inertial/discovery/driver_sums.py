@@ -17,12 +17,13 @@ class DriverSums(Levels):
     units : number of units of each level · about : origin from which a number is counted
     inside_only : whether the driver is judged only by differences within lots
     inside, between : information from differences within lots, and from the means of lots
+    noise : variance over the stated one of the means of lots and of units within lots, by which scores are divided
     spread : rms of the numbers over the units, about the origin; 1 for labels
     """
 
-    def __init__(self, driver: str, lots: Sequence[ScoredLot]) -> None:
+    def __init__(self, driver: str, lots: Sequence[ScoredLot], noise: tuple[float, float]) -> None:
         super().__init__(lots[0].information.size)
-        self.driver, self.units, self.inside, self.between = driver, Counter[str](), 0.0, 0.0
+        self.driver, self.noise, self.units, self.inside, self.between = driver, noise, Counter[str](), 0.0, 0.0
         self.inside_only = driver in {SLOT, UNIT}
         means = [float(numbers.mean()) for lot in lots if (numbers := lot.number(driver)) is not None]
         self.about, self.spread = float(np.nanmean(means)) if means else 0.0, 1.0
@@ -61,15 +62,14 @@ class DriverSums(Levels):
         """Sizes (units, h) that the sums predict for the units of a lot."""
         return self.weights(lot) @ over(self.centred, self.information)
 
-    def gather(self, lot: ScoredLot, mean: Array, noise: tuple[float, float], seen: Mapping[str, int]) -> None:
+    def gather(self, lot: ScoredLot, mean: Array, seen: Mapping[str, int]) -> None:
         """Add a lot.
 
         Parameters
         ----------
-        mean : (h,), mean size of the lots of its station · noise : as of :func:`_noise`
-        seen : number of lots of each unit; of those with one nothing is learnt
+        mean : (h,), mean size of the lots of its station · seen : number of lots of each unit; one alone tells nothing
         """
-        between, within = noise
+        between, within = self.noise
         by_unit, total, info, left = lot.own, lot.total, lot.information, lot.inside[0]
         sums, labels = np.where(info > 0.0, lot.score.sum(axis=0), 0.0), lot.labels(self.driver)
         numbers = lot.number(self.driver)
@@ -127,11 +127,11 @@ def gathered(
     """
     means = _station_means(lots)
     noise = _noise(lots, means)
-    out = {name: DriverSums(name, lots) for name in drivers}
+    out = {name: DriverSums(name, lots, noise) for name in drivers}
     seen = Counter(unit for lot in (*lots, *compared) for unit in lot.units) if UNIT in out else Counter[str]()
     for lot in lots:
         for sums in out.values():
-            sums.gather(lot, means[lot.station], noise, seen)
+            sums.gather(lot, means[lot.station], seen)
     for sums in out.values():
         sums.complete()
     return {name: sums for name, sums in out.items() if sums.labels}

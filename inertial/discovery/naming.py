@@ -6,7 +6,7 @@ is subtracted from all sums by the products of the columns, and the remainder is
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -16,18 +16,16 @@ from inertial.arrays import Array, Places, over
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import DriverSums, gathered
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
+from inertial.discovery.level_fit import WIDE, LevelFit, LevelSizes
 from inertial.discovery.pose_shape import SHAPE
 from inertial.discovery.scores import Products, correlations_of
 
 _MOST = 6
 """Largest number of names of one evaluation."""
 
-_TURNS = 5  # iterations of a fit of columns and levels that share lots
+_ROUNDS = 3
+"""Number of fits of the effects of each driver beside those of the others, where there are several names."""
 
-_RELAXED = 2.0 / 3.0
-"""Part of the fitted sizes of levels that an iteration subtracts. Where lots have levels in pairs, each shows half of the other
-with the opposite sign, and a full step would turn it round; of modes with 1 to 2 times the information it leaves a third at most.
-"""
 
 _INEXACT = 0.02
 """Relative uncertainty of a score: products of columns are means over lots, parameters are at the middle of their range."""
@@ -59,38 +57,32 @@ Scores = dict[tuple[str, str], float]
 class Name:
     """An effect found in an archive, with its driver.
 
-    effects, drivers : equivalent ids, best first · sizes, errors : (levels, axes), g, rms per dwell and standard errors
-    labels, weights : names of the levels, and their numbers of units · score : score of the best
+    effects, drivers : equivalent ids, best first · score : score of the best
+    labels, weights : names of the levels, and their numbers of units
+    sizes, errors : (levels, axes), g, rms per dwell and standard errors, by the scatter of the lots
+    square : mean square over levels and axes, g², less what noise adds, and its standard deviation
     """
 
     effects: tuple[str, ...]
     drivers: tuple[str, ...]
-    labels: tuple[str, ...]
-    weights: Array
-    sizes: Array
-    errors: Array
     score: float
+    labels: tuple[str, ...] = ()
+    weights: Array = field(default_factory=lambda: np.zeros(0))
+    sizes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    errors: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    square: tuple[float, float] = (0.0, 0.0)
 
     def by_axis(self) -> list[float]:
         """Rms size of each axis over the levels, g, corrected for noise."""
-        weight, _, squares = self._squares()
+        weight = self.weights[:, None] / max(float(self.weights.sum()), 1e-300)
+        squares = np.where(np.isfinite(self.errors), self.sizes**2 - np.nan_to_num(self.errors, posinf=0.0) ** 2, 0.0)
         return np.sqrt(np.maximum((weight * squares).sum(axis=0), 0.0)).tolist()
 
     def size(self) -> tuple[float, float, float]:
         """Rms size over levels and axes, and the ends of its 95 % interval, g."""
-        weight, errors, squares = self._squares()
-        each = weight / 3.0
-        mean = float((each * squares).sum())
-        spread = 2.0 * float(np.sqrt((each**2 * (4.0 * self.sizes**2 * errors**2 + 2.0 * errors**4)).sum()))
+        mean, spread = self.square[0], WIDE * self.square[1]
         size, low, high = np.sqrt(np.maximum([mean, mean - spread, mean + spread], 0.0)).tolist()
         return size, low, high
-
-    def _squares(self) -> tuple[Array, Array, Array]:
-        """Weights of the levels (n, 1); standard errors (zero if unknown), g, and squares less noise, g², of the sizes."""
-        finite = np.isfinite(self.errors)
-        errors = np.where(finite, self.errors, 0.0)
-        weight = self.weights / max(float(self.weights.sum()), 1e-300)
-        return weight[:, None], errors, np.where(finite, self.sizes**2 - errors**2, 0.0)
 
 
 @dataclass(frozen=True)
@@ -133,7 +125,7 @@ class Pool:
         found, every = list[Name](), lots
         of_pose: list[Scores] = []  # scores of any function of pose by driver, before each name and after the last
         while True:
-            sums, scores, significant = self._judged(lots, drivers, needed)
+            _, scores, significant = self._judged(lots, drivers, needed)
             of_pose.append({pair: score for pair, score in scores.items() if pair[1] == SHAPE})
             if found:
                 # what the best of a class does not take away is another effect, with the same score by chance
@@ -148,20 +140,16 @@ class Pool:
                 # a remainder of other names is named only if it had an alarm itself and a clearly higher score
                 and (pair in alarmed and scores[pair] > needed + CLASS_WIDTH if found else self._raised(pair, alarmed))
             ]
-            every_name = (self._name(sums[driver], effect, scores) for _, driver, effect in sorted(pairs, reverse=True))
+            every_name = (self._name(driver, effect, scores) for _, driver, effect in sorted(pairs, reverse=True))
             name = next((name for name in every_name if not self._already_named(found, name)), None)
             if name is None or len(found) == _MOST:
                 break
-            lots, *fitted = self._subtracted(lots, name.drivers[0], name.effects[0])
-            sizes, errors = self._sizes(sums[name.drivers[0]], name.effects[0], *fitted)
-            found.append(replace(name, sizes=sizes, errors=errors))
+            lots = self._subtracted(lots, name.drivers[0], name.effects[0])
+            found.append(name)
         imitations = _imitations(found, of_pose, needed)
-        genuine = [name for at, name in enumerate(found) if at not in imitations]
-        if len(genuine) < len(found):
-            lots = every
-            for name in genuine:
-                lots, *_ = self._subtracted(lots, name.drivers[0], name.effects[0])
-        return genuine, self._unnamed(lots, genuine, drivers, needed)
+        found = [name for at, name in enumerate(found) if at not in imitations]
+        sized, lots = self._sized(found, every)
+        return sized, self._unnamed(lots, found, drivers, needed)
 
     def _unnamed(
         self, lots: Sequence[ScoredLot], names: Sequence[Name], drivers: Sequence[str], needed: float
@@ -174,9 +162,9 @@ class Pool:
             best = max((pair for pair in significant if pair[1] == SHAPE), key=lambda pair: scores[pair], default=None)
             if best is None or scores[best] <= least or best[0] in {unnamed.driver for unnamed in out}:
                 break
-            out.append(self._shape(sums[best[0]]))
+            out.append(self._shape(lots, sums[best[0]]))
             least = max(least, _REMAINDER * scores[best])
-            lots, *_ = self._subtracted(lots, *best)
+            lots = self._subtracted(lots, *best)
         return out
 
     def _judged(
@@ -201,25 +189,27 @@ class Pool:
         ]
         return sums, scores, significant
 
-    def _shape(self, sums: DriverSums) -> Unnamed:
+    def _shape(self, lots: Sequence[ScoredLot], sums: DriverSums) -> Unnamed:
         """The dependence on pose of the level with the largest one."""
-        size, products = self._fitted(sums, SHAPE)
-        z = size / np.sqrt(np.maximum(np.diagonal(products, axis1=2, axis2=3), 1e-300))
-        level = int(np.argmax(np.sum(z**2, axis=(0, 2))))
+        fit = self._fit(lots, sums, SHAPE).solved()
+        z2 = over(fit.sizes**2, (fit.errors**2).mean(axis=0)).sum(axis=1)
+        level = int(np.argmax(z2))
+        errors = fit.errors[:, level].reshape(len(fit.errors), self.axes, -1)
+        covariance = np.einsum("nap,naq->apq", errors, errors) / len(errors)
         label = sums.labels[level] if len(sums.labels) > 1 else ""
-        return Unnamed(sums.driver, label, size[:, level], products[:, level])
+        return Unnamed(sums.driver, label, fit.sizes[level].reshape(self.axes, -1), covariance)
 
-    def _fitted(self, sums: DriverSums, effect: str) -> tuple[Array, Array]:
-        """Sizes (axes, levels, p) of an effect's columns, fitted jointly per level, and covariances (axes, levels, p, p)."""
-        here, inner = self.everywhere(effect), self._inner(sums, effect)
-        root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
-        scale = over(1.0, root)
-        sizes = scale * (over(sums.centred[:, here], root) @ inner)
-        covariance = (scale[:, :, None] * inner * scale[:, None, :]).reshape(
-            len(root), self.axes, -1, self.axes, here.size // self.axes
-        )
-        covariances = np.stack([covariance[:, axis, :, axis] for axis in range(self.axes)])
-        return np.moveaxis(sizes.reshape(len(root), self.axes, -1), 1, 0), covariances
+    def _fit(self, lots: Sequence[ScoredLot], sums: DriverSums, *effects: str, stated: bool = False) -> LevelFit:
+        """The normal equations of effects by a driver, which has the sums over the lots."""
+        here = self.everywhere(*effects)
+        of_means = self.lot[np.ix_(here, here)]
+        among = self._within(*effects), of_means, self._inner(sums, *effects), _inverse(of_means)
+        return LevelFit(lots, sums, here, self.axes, among, stated=stated)
+
+    def _within(self, *effects: str) -> Array:
+        """Correlations (axes·p, axes·p) of the hypotheses of effects within lots."""
+        at = self.places(*effects)
+        return np.asarray(block_diag(*self.inside[:, at[:, None], at]), dtype=np.float64)
 
     def _raised(self, pair: tuple[str, str], alarmed: Iterable[tuple[str, str]]) -> bool:
         """Whether an effect or one with similar columns, or any function of the pose, had an alarm by a driver."""
@@ -242,32 +232,26 @@ class Pool:
                 return True
         return False
 
-    def _subtracted(
-        self, lots: Sequence[ScoredLot], driver: str, effect: str
-    ) -> tuple[Sequence[ScoredLot], Array, Array]:
-        """The lots with an effect of a driver subtracted, iterated because its columns and levels share lots.
+    def _subtracted(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
+        """The lots with an effect of a driver subtracted, and with what all have of it in common."""
+        for by in dict.fromkeys((driver, MEAN)):  # sizes are about the mean of levels, or of numbers
+            lots, _ = self._taken(lots, by, effect)
+        return lots
 
-        Returns
-        -------
-        lots, sizes (axes, levels, p) of the columns as fitted together, and their covariances (axes, levels, p, p)
-        """
-        taken: Array | float = 0.0
-        fitted, covariance = np.zeros((2, self.axes, 0))
-        for _ in range(_TURNS):
-            sums = gathered(lots, [driver]).get(driver)
-            if sums is None or self.score(sums, effect) < 1.0:
-                break
-            sizes, covariance = self._fitted(sums, effect)
-            fitted = taken + sizes
-            if len(sums.labels) > 1:  # sizes of levels are shrunk towards zero according to their noise
-                noise = np.maximum(np.diagonal(covariance, axis1=2, axis2=3), 0.0).sum(axis=1)
-                share = 1.0 - noise / np.maximum((sizes**2).sum(axis=1), 1e-300)
-                sizes = _RELAXED * sizes * np.clip(share, 0.0, 1.0)[:, None]
-            taken = taken + sizes
-            lots = [self.without(lot, sums, effect, sizes) for lot in lots]
-        if driver != MEAN:
-            lots, *_ = self._subtracted(lots, MEAN, effect)  # sizes are about the mean of levels, or of numbers
-        return lots, fitted, covariance
+    def _taken(self, lots: Sequence[ScoredLot], driver: str, *effects: str) -> tuple[Sequence[ScoredLot], Array]:
+        """The lots with effects of a driver subtracted, and the sizes (levels, axes·p) that were."""
+        sums = gathered(lots, [driver])[driver]
+        fit = self._fit(lots, sums, *effects, stated=True)
+        taken = fit.solved(draws=0).sizes
+        if fit.levels > 1:  # sizes of levels are shrunk towards zero according to their noise
+            noise, squares = fit.stated_variance.sum(axis=1), (taken**2).sum(axis=1)
+            taken = taken * np.clip(1.0 - noise / np.maximum(squares, 1e-300), 0.0, 1.0)[:, None]
+        return [self.without(lot, sums, taken, *effects) for lot in lots], taken
+
+    def _with(self, lots: Sequence[ScoredLot], driver: str, taken: Array, *effects: str) -> Sequence[ScoredLot]:
+        """The lots with what was subtracted of effects, (levels, axes·p), added again."""
+        sums = gathered(lots, [driver])[driver]
+        return [self.without(lot, sums, -taken, *effects) for lot in lots]
 
     def _crossed(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> Iterator[tuple[str, Array]]:
         """For each lot and driver, the product of the lot's scores and their prediction by the other half, (effects,)."""
@@ -311,24 +295,23 @@ class Pool:
         inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
         return inside if sums.inside_only else inside + common**2 * lot.information
 
-    def without(self, lot: ScoredLot, sums: DriverSums, effect: str, sizes: Array) -> ScoredLot:
-        """A lot with an effect of sizes (axes, levels, p) subtracted from its sums; no dwell is read again."""
-        at, count, units = self.places(effect), len(self.columns), len(lot.units)
-        weights = sums.weights(lot)
+    def without(self, lot: ScoredLot, sums: DriverSums, sizes: Array, *effects: str) -> ScoredLot:
+        """A lot with effects of sizes (levels, axes·p) subtracted from its sums; no dwell is read again."""
+        at, count, weights = self.places(*effects), len(self.columns), sums.weights(lot)
         if not weights.any():
             return lot
-        score = lot.score.copy()
-        root, everywhere = np.sqrt(np.maximum(lot.information, 0.0)), self.everywhere(effect)
+        score, sizes = lot.score.copy(), sizes.reshape(len(sizes), self.axes, -1)
+        root, everywhere = np.sqrt(np.maximum(lot.information, 0.0)), self.everywhere(*effects)
         in_common: list[Array] = []
         for axis in range(self.axes):
             here, every = axis * count + at, axis * count + np.arange(count)
-            of_units = weights @ sizes[axis]  # (units, p)
+            of_units = weights @ sizes[:, axis]  # (units, p)
             unit_roots = np.sqrt(np.maximum(lot.own[:, every], 0.0))
             total = np.maximum(lot.own[:, here].sum(axis=0), 1e-300)
             in_common.append((of_units * lot.own[:, here]).sum(axis=0) / total)
             score[:, every] -= unit_roots * (((of_units - in_common[-1]) * unit_roots[:, at]) @ self.inside[axis][at])
         # the free errors of the station couple the axes
-        score -= root * ((np.concatenate(in_common) * root[everywhere]) @ self.lot[everywhere]) / units
+        score -= lot.own / lot.total * root * ((np.concatenate(in_common) * root[everywhere]) @ self.lot[everywhere])
         return replace(lot, score=score)
 
     def with_effect(self, lot: ScoredLot, effect: str) -> ScoredLot:
@@ -344,26 +327,22 @@ class Pool:
         score = np.where(by_unit > 0.0, left + share * sums, 0.0)
         return replace(lot, score=score, own=by_unit, information=information)
 
-    def places(self, effect: str) -> Places:
-        """Indices of the columns of an effect, (p,)."""
-        return np.array([k for k, (name, _) in enumerate(self.columns) if name == effect], dtype=np.intp)
+    def places(self, *effects: str) -> Places:
+        """Indices of the columns of effects, (p,)."""
+        return np.array([k for k, (name, _) in enumerate(self.columns) if name in effects], dtype=np.intp)
 
-    def everywhere(self, effect: str) -> Places:
-        """Indices of the hypotheses of an effect, (axes·p,), axis by axis."""
-        return (np.arange(self.axes)[:, None] * len(self.columns) + self.places(effect)).reshape(-1)
+    def everywhere(self, *effects: str) -> Places:
+        """Indices of the hypotheses of effects, (axes·p,), axis by axis."""
+        return (np.arange(self.axes)[:, None] * len(self.columns) + self.places(*effects)).reshape(-1)
 
-    def _inner(self, sums: DriverSums, effect: str) -> Array:
-        """Pseudo-inverse of the correlations of an effect's hypotheses, (axes·p, axes·p), for a driver.
+    def _inner(self, sums: DriverSums, *effects: str) -> Array:
+        """Pseudo-inverse of the correlations of the hypotheses of effects, (axes·p, axes·p), for a driver.
 
         Combinations that vanish beside errors of the station, or by rounding of the stored sums, are excluded: otherwise a large
         effect would seem to explain three times the actual chi-square.
         """
-        at, here = self.places(effect), self.everywhere(effect)
-        if sums.mixed:
-            among = np.asarray(block_diag(*self.inside[:, at[:, None], at]), dtype=np.float64)
-        else:
-            among = self.lot[np.ix_(here, here)]
-        return np.linalg.pinv(among, rcond=_SEEN, hermitian=True).astype(np.float64)
+        here = self.everywhere(*effects)
+        return _inverse(self._within(*effects) if sums.mixed else self.lot[np.ix_(here, here)])
 
     def score(self, sums: DriverSums, effect: str) -> float:
         """Score of an effect for a driver: the reduction of chi-square by its columns less the price of their coefficients."""
@@ -374,8 +353,9 @@ class Pool:
         k = float(np.sum(rank) - (np.count_nonzero(rank) if len(sums.place) > 1 else 0))
         return max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
 
-    def _name(self, sums: DriverSums, effect: str, scores: Scores) -> Name:
-        driver, top = sums.driver, scores[sums.driver, effect]
+    def _name(self, driver: str, effect: str, scores: Scores) -> Name:
+        """An effect of a driver with those that are equivalent, without its sizes."""
+        top = scores[driver, effect]
 
         def rank(rival: str) -> tuple[bool, int, int, float]:
             """Sort key in a class: among effects that inexact columns do not distinguish, the simplest is first."""
@@ -389,31 +369,59 @@ class Pool:
         alike = [name for name, of in scores if of == effect and (name == MEAN) == (driver == MEAN)]
         drivers = [name for name in alike if scores[name, effect] > top - CLASS_WIDTH]
         drivers.sort(key=lambda other: (other != driver, -scores[other, effect]))
-        weights = np.array(list(sums.units.values()), dtype=np.float64)
-        return Name(
-            tuple(effects),
-            tuple(drivers),
-            tuple(sums.labels),
-            weights,
-            *self._sizes(sums, effects[0], *self._fitted(sums, effects[0])),
-            top,
-        )
+        return Name(tuple(effects), tuple(drivers), top)
 
-    def _sizes(self, sums: DriverSums, effect: str, coefficients: Array, covariances: Array) -> tuple[Array, Array]:
-        """Rms over the dwells, g, of an effect with all its columns by level and axis, (levels, axes), and standard errors.
+    def _sized(self, names: Sequence[Name], lots: Sequence[ScoredLot]) -> tuple[list[Name], Sequence[ScoredLot]]:
+        """Names with their sizes, fitted together, and what they leave of the lots."""
+        groups: dict[str, list[str]] = {}
+        for name in names:
+            for driver in dict.fromkeys((name.drivers[0], MEAN)):
+                groups.setdefault(driver, []).append(name.effects[0])
+        taken: dict[str, Array] = {}
+        for _ in range(_ROUNDS if len(names) > 1 else 1):
+            for driver, effects in groups.items():
+                if driver in taken:
+                    lots = self._with(lots, driver, taken[driver], *effects)
+                lots, taken[driver] = self._taken(lots, driver, *effects)
+        out: dict[tuple[str, str], Name] = {}
+        for driver, effects in groups.items():
+            of_driver = [name for name in names if name.drivers[0] == driver]
+            if of_driver:
+                alone = self._with(lots, driver, taken[driver], *effects)
+                sums = gathered(alone, [driver])[driver]
+                fit = self._fit(alone, sums, *effects).solved()
+                out |= {(driver, name.effects[0]): self._of_fit(name, sums, fit, effects) for name in of_driver}
+        return [out[name.drivers[0], name.effects[0]] for name in names], lots
 
-        Of a number: rms over the units, too.
+    def _of_fit(self, name: Name, sums: DriverSums, fit: LevelSizes, effects: Sequence[str]) -> Name:
+        """A name with its sizes: rms over the dwells of all its columns by level and axis; of a number, over the units, too.
 
         The sign is that of the column with the largest sum of squares; an error is infinite where no lot shows the axis.
         """
-        at = self.places(effect)
-        size = sums.spread * self.size[self.everywhere(effect)].reshape(self.axes, 1, -1)
-        columns, covariances = coefficients * size, covariances * size[..., None] * size[..., None, :]
-        among = self.inside[:, at[:, None], at]
-        squares = np.einsum("agp,apq,agq->ga", columns, among, columns)
-        errors = np.sqrt(np.maximum(np.einsum("apq,agqp->ga", among, covariances), 0.0))
-        largest = columns[..., int(np.argmax(np.sum(columns**2, axis=(0, 1))))].T
-        return np.copysign(np.sqrt(np.maximum(squares, 0.0)), largest), np.where(errors > 0.0, errors, np.inf)
+        here = self.everywhere(*effects)
+        unit = sums.spread * self.size[here] * np.isin(here, self.everywhere(name.effects[0]))
+        among, count = self._within(*effects), unit.size // self.axes
+        of_axes = [unit * np.repeat(np.eye(self.axes)[axis], count) for axis in range(self.axes)]
+        parts = [np.outer(part, part) * among for part in of_axes]
+        squares = np.stack([np.einsum("gp,pq,gq->g", fit.sizes, part, fit.sizes) for part in parts], axis=1)
+        noise = np.stack([np.einsum("ngp,pq,ngq->g", fit.errors, part, fit.errors) for part in parts], axis=1)
+        errors = np.sqrt(np.maximum(noise / len(fit.errors), 0.0))
+        columns = (fit.sizes * unit).reshape(-1, self.axes, count)
+        largest = columns[..., int(np.argmax((columns**2).sum(axis=(0, 1))))]
+        mean, deviation = fit.mean_square(np.sum(parts, axis=0))
+        return replace(
+            name,
+            labels=tuple(sums.labels),
+            weights=np.array(list(sums.units.values()), dtype=np.float64),
+            sizes=np.copysign(np.sqrt(np.maximum(squares, 0.0)), largest),
+            errors=np.where(errors > 0.0, errors, np.inf),
+            square=(mean / self.axes, deviation / self.axes),
+        )
+
+
+def _inverse(products: Array) -> Array:
+    """Pseudo-inverse of correlations, without combinations that are not seen."""
+    return np.linalg.pinv(products, rcond=_SEEN, hermitian=True).astype(np.float64)
 
 
 def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float) -> set[int]:

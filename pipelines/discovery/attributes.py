@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime, timedelta
 from io import StringIO
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -27,6 +28,7 @@ NOT_DRIVERS = {"grade", "outcome", "pass", "passed", "fail", "failed", "yield", 
 
 _SHOWN = 5
 _DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
+_FIRST_TO_BEGIN = timedelta(hours=14)  # a day begins so much earlier in the easternmost time zone than in UTC
 _DECIMAL_COMMA = r"^\s*([+-]?\d+),(\d+)\s*$"
 
 
@@ -75,6 +77,7 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
         "unknown": unknown,
         "similar": similar,
         "refused": refused,
+        "future": _future(new),
         "quantities": [name for name in names if as_numbers(known_attributes(archive).values(name)) is not None],
         "file": file,
     }
@@ -92,6 +95,15 @@ def as_numbers(values: Iterable[str]) -> dict[str, float] | None:
         return numbers
     finite = all(math.isfinite(number) for number in numbers.values())
     return numbers if finite and any(not number.is_integer() for number in numbers.values()) else None
+
+
+def _future(values: Mapping[str, Mapping[str, str]]) -> list[str]:
+    """Dates after today, each with its attribute and subject; a date when something is due may be."""
+    today = (datetime.now(UTC) + _FIRST_TO_BEGIN).date().isoformat()
+    every = ((subject, name, value) for subject, texts in values.items() for name, value in texts.items())
+    return [
+        f"{value} as {name} of {subject}" for subject, name, value in every if _DAY.fullmatch(value) and value > today
+    ]
 
 
 def _append(archive: Archive, content: Mapping[str, Any]) -> str:
@@ -161,6 +173,12 @@ def sentences(added: AddedAttributes) -> list[str]:
         counted = number_of(len(added["unknown"]), str(added["by"]))
         lines.append(f"not in the archive yet: {counted} ({_some(added['unknown'], _SHOWN)}); they are kept")
         lines += [f"{subject}: {did_you_mean(subject, close)}" for subject, close in added["similar"].items()]
+    if added["future"]:
+        dates = number_of(len(added["future"]), "date")
+        lines.append(
+            f"after today: {dates} ({_some(added['future'], _SHOWN)}), today or earlier is needed unless something is due then; "
+            "correct what is wrong in a file of its own"
+        )
     if added["refused"]:
         lines.append(f"not taken, because they follow from the result: {', '.join(added['refused'])}")
     return lines

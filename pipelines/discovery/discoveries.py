@@ -11,6 +11,7 @@ from inertial.counts import number_of
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import DriverSums, gathered
 from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
+from inertial.discovery.level_fit import WIDE, LevelFit, LevelSizes
 from inertial.discovery.naming import Name, Unnamed
 from inertial.discovery.pose_shape import SHAPE, map_of
 from inertial.discovery.running_sums import growth_of
@@ -211,27 +212,32 @@ class Discoveries:
         effect, column, _ = self.state.hypotheses[alarm.index]
         at = alarm.index - self.state.sensor.size
         here = [k for k, (name, _) in enumerate(self.state.of_station) if name == effect]
-        unit = self._sizes_of_station(here)
-        common, about, errors = (unit * part for part in self._station_levels(alarm.driver, here))
-        size = float(np.sqrt((common**2).sum() if alarm.driver == MEAN else np.mean((about**2).sum(axis=1))))
-        largest = here.index(at)
-        reach = 2.0 * float(errors[:, largest].max())
+        unit, largest = self._sizes_of_station(here), here.index(at)
+        of_stations, fit = (self._station_fit(driver, here) for driver in (STATION, alarm.driver))
+        square, deviation = fit.mean_square(np.diag(unit**2))
+        size, low, high = np.sqrt(np.maximum(square + WIDE * deviation * np.array([0.0, -1.0, 1.0]), 0.0)).tolist()
+        common, *_ = self._station_levels(alarm.driver, here)
+        sizes = (unit * (common + of_stations.sizes))[:, largest]
+        errors = unit[largest] * np.sqrt(np.mean(of_stations.errors[..., largest] ** 2, axis=0))
         drops = sorted(
             (self._explained(a), self.state.effect_of(a)) for a in self._of_station if a.driver == alarm.driver
         )
         effects = dict.fromkeys(name for drop, name in reversed(drops) if drop > drops[-1][0] - CLASS_WIDTH)
         because = f"the force is changed equally for all units of a lot (column {column + 1} of {effect})"
-        ends = size, max(size - reach, 0.0), size + reach
-        row = self._row(alarm, [*effects], [alarm.driver], ends, ("station", because), self._log_e(alarm))
+        row = self._row(alarm, [*effects], [alarm.driver], (size, low, high), ("station", because), self._log_e(alarm))
         row["kind"] = "slope" if alarm.driver == DATE else row["kind"]
         row["levels"] = [
-            {"level": label, "size_ug": MICRO * float(value), "u_ug": MICRO * float(error), "units": 0}
-            for label, value, error in zip(
-                self._station_sums.labels, (common + about)[:, largest], errors[:, largest], strict=True
-            )
+            {"level": label, "axis": "", "size_ug": MICRO * value, "u_ug": MICRO * error, "units": 0}
+            for label, value, error in zip(self._station_sums.labels, sizes.tolist(), errors.tolist(), strict=True)
         ]
         row["next"] = "check the station's references (level, encoders, fixture), see 'tumbleline audit'"
         return row
+
+    def _station_fit(self, driver: str, columns: Sequence[int]) -> LevelSizes:
+        """Sizes of columns of the station, common to all lots, or by station about their mean."""
+        lots, by = [station for _, station in self._both], MEAN if driver == MEAN else STATION
+        alone = np.eye(len(columns))
+        return LevelFit(lots, gathered(lots, [by])[by], np.array(columns), 1, (alone, alone, alone, alone)).solved()
 
     def _station_levels(self, driver: str, columns: Sequence[int]) -> tuple[Array, Array, Array]:
         """Coefficients of columns of the station: common (p,), of each station about it, and standard errors (stations, p)."""
@@ -347,6 +353,7 @@ def _levels_of(name: Name) -> list[DiscoveredLevel]:
     return [
         {
             "level": name.labels[at],
+            "axis": "xyz"[axis],
             "size_ug": MICRO * float(name.sizes[at, axis]),
             "u_ug": MICRO * float(name.errors[at, axis]),
             "units": int(name.weights[at]),

@@ -39,7 +39,8 @@ class DiscoveredLevel(TypedDict):
     """One level of a driver."""
 
     level: str
-    size_ug: Annotated[float, "signed, on the axis with the largest differences"]
+    axis: Annotated[str, "the axis with the largest differences; empty: of the force on all axes"]
+    size_ug: Annotated[float, "signed, on this axis"]
     u_ug: Annotated[float, "one standard error"]
     units: int
 
@@ -183,6 +184,7 @@ class AddedAttributes(TypedDict):
     unknown: Annotated[list[str], "serials or runs that the archive does not have yet"]
     similar: Annotated[dict[str, list[str]], "of the first five unknown ones, those of the archive that are similar"]
     refused: Annotated[list[str], "columns that follow from the result of a calibration, and were not taken"]
+    future: Annotated[list[str], "dates after today, with attribute and key"]
     quantities: Annotated[list[str], "attributes that are judged as numbers or days; the others are labels"]
     file: Annotated[str, "where they are kept, in the archive"]
 

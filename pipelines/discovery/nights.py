@@ -21,7 +21,7 @@ from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
 
-_VERSION = 4  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
+_VERSION = 5  # of the stored findings: only ids of an earlier version are used, and the naming is repeated
 _GROWN = 1.05  # growth of the number of lots from which on the naming is repeated
 _NOTHING: dict[str, Any] = {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0, "alarms": None}
 

@@ -52,7 +52,8 @@ def _levels_chart(row: DiscoveryRow) -> Chart:
     )
     traces = (level(position, 0.0), Trace("95 % interval", position, size, error=1.96 * error, size=7.0, texts=texts))
     axis = PlotAxis(row["driver"], names=tuple(entry["level"] for entry in levels))
-    plot = Plot("", axis, PlotAxis(f"{row['recommended']} in a dwell / µg"), traces)
+    on = f" on {levels[0]['axis']}" if levels[0]["axis"] else ""
+    plot = Plot("", axis, PlotAxis(f"{row['recommended']}{on} in a dwell / µg"), traces)
     return Chart(f"{row['recommended']} by {row['driver']}", (plot,), height=280)
 
 

@@ -33,7 +33,8 @@ def scope_text(row: DiscoveryRow) -> str:
     if row["kind"] == "levels" and row["levels"]:
         top = row["levels"][0]
         sign = "+" if top["size_ug"] >= 0 else "−"
-        text += f"; largest {top['level']} {sign}{short(abs(top['size_ug']))} ± {short(2.0 * top['u_ug'])} µg"
+        axis = f" on {top['axis']}" if top["axis"] else ""
+        text += f"; largest {top['level']}{axis} {sign}{short(abs(top['size_ug']))} ± {short(2.0 * top['u_ug'])} µg"
     return text
 
 

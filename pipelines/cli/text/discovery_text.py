@@ -108,7 +108,8 @@ def print_explained(row: DiscoveryRow | UnexplainedRow) -> None:
             [level["level"], short(level["size_ug"]), short(level["u_ug"]), str(level["units"] or "")]
             for level in row["levels"]
         ]
-        print_table([row["driver"], "size\nµg", "u\nµg", "units"], lines[:_SHOWN_LEVELS])
+        axis = f" on {row['levels'][0]['axis']}" if row["levels"] and row["levels"][0]["axis"] else ""
+        print_table([row["driver"], f"size{axis}\nµg", "u\nµg", "units"], lines[:_SHOWN_LEVELS])
         if len(lines) > _SHOWN_LEVELS:
             say(f"{len(lines) - _SHOWN_LEVELS} more; --json and --output have them")
     say(f"next: {row['next']}")

@@ -92,22 +92,22 @@ def test_what_all_stations_have_alike_is_no_difference_of_stations() -> None:
     assert pool().names(lots, {("station", "scale_asymmetry")}, NEEDED) == ([], [])
 
 
-def about(lot: ScoredLot) -> tuple[np.ndarray, np.ndarray]:
-    """Scores of the units about the mean of the lot, and their information."""
-    return lot.inside[0], lot.own
+def supplied(result: Result) -> list[ScoredLot]:
+    """The units of every other slot are of one supplier."""
+    return [replace(lot, levels={"supplier": ("north", "south") * 4}) for lot in result.lots]
 
 
 def test_two_levels_have_the_size_about_their_mean_and_leave_nothing() -> None:
     """Each lot has four units of either supplier: the difference of one from the mean of the lot is half of theirs."""
-    lots = archive("cross_coupling", "slot").lots
-    supplied = [replace(lot, levels={"supplier": ("north", "south") * 4}) for lot in lots]
-    (name, *_), _ = pool().names(supplied, {("supplier", "cross_coupling")}, NEEDED)
-    first = pool().everywhere("cross_coupling")[
-        0::2
-    ]  # the other columns are of products that the hidden effect has not
-    score, own = (sum(part[0::2, first].sum(axis=0) for part in parts) for parts in zip(*map(about, lots), strict=True))
-    assert name.sizes[0] == pytest.approx(score / own * pool().size[first], rel=0.06, abs=0.2e-6)
-    left = pool()._subtracted(supplied, "supplier", "cross_coupling")[0]
+    result = maker().archive(31, 40, Hidden("cross_coupling", "slot", 0.1), Setting(), keep=True)
+    (name, *_), _ = pool().names(supplied(result), {("supplier", "cross_coupling")}, NEEDED)
+    hidden = 1e-6 * FLOOR_UG * np.mean(result.hidden, axis=0)
+    true = hidden[0::2].mean(axis=0) - hidden.mean(axis=0)
+    assert np.all(name.errors[0] < 0.25e-6)
+    assert np.all(np.abs(np.abs(name.sizes[0]) - np.abs(true)) < 3.0 * name.errors[0])
+    lots = supplied(archive("cross_coupling", "slot"))
+    (name, *_), _ = pool().names(lots, {("supplier", "cross_coupling")}, NEEDED)
+    left = pool()._subtracted(lots, "supplier", "cross_coupling")
     assert pool().score(gathered(left, ["supplier"])["supplier"], "cross_coupling") < 0.01 * name.score
 
 

@@ -120,3 +120,14 @@ def test_how_a_column_is_judged_is_said(archive: Archive) -> None:
     assert "labels: radius" in sentences(added)
     judged = {row["attribute"]: row["judged_as"] for row in listed(archive)["attributes"]}
     assert judged == {"wafer": "labels", "radius": "labels", "tested": "quantity"}
+
+
+def test_a_date_after_today_is_told_once_and_kept(archive: Archive) -> None:
+    added = add_attributes(archive, table("serial,assembled_on A1,2999-01-05 A2,2024-01-05"), "serial", "a.csv")
+    assert added["future"] == ["2999-01-05 as assembled_on of A1"]
+    assert any(
+        "after today: 1 date (2999-01-05 as assembled_on of A1), today or earlier is needed" in s
+        for s in sentences(added)
+    )
+    again = add_attributes(archive, table("serial,assembled_on A1,2999-01-05"), "serial", "b.csv")
+    assert again["future"] == []
