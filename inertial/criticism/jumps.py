@@ -90,10 +90,16 @@ def jumps_in_place_of_wander(field: Candidates, model: Model) -> tuple[Term, ...
     for less in {shares.times(1.0, 0.0), shares.times(LESS_FLICKER, LESS_WALK), shares.times(0.0, 0.0)} - {shares}:
         space = model.at(model.noise_at(less))
         found = max((_best(field, space, block, {}) for block in slow), key=lambda jumps: jumps.score, default=_NONE)
-        gain = _beyond_wander(field, model, found.terms) if found.terms else 0.0
+        gain = _beyond_wander(field, model, found.terms) if found.terms and not _single_dwells(found.terms) else 0.0
         if gain > most:
             tried, most = found.terms, gain
     return tried
+
+
+def _single_dwells(jumps: tuple[Term, ...]) -> bool:
+    """Whether jumps only lead to a dwell and back: it is then a bad dwell, which is judged as such."""
+    dwells = [int(jump.location["dwell"]) for jump in jumps]
+    return len(dwells) % 2 == 0 and all(b - a == 1 for a, b in zip(dwells[::2], dwells[1::2], strict=True))
 
 
 def _beyond_wander(field: Candidates, model: Model, jumps: tuple[Term, ...]) -> float:
