@@ -155,6 +155,7 @@ def document(
         *without_history(measurement, terms),
         *result_rows.noise_along(diagnosis.run),
         *result_rows.noise_of_the_lot(diagnosis.final, len(units)),
+        *result_rows.less_than_samples(diagnosis.final),
     ]
     error = error_of(diagnosis.rms, diagnosis.floor, diagnosis.log_p)
     adequate, why, error = told(diagnosis.base, diagnosis.adequate, diagnosis.unjudged, error)

@@ -39,6 +39,9 @@ BAD_DWELL = "bad_dwell"
 _ALIKE = 0.5
 """Share of the residual variance common to all units from which on a notice is given."""
 
+_LESS = 3.0
+"""Noise of a dwell by its samples over that by the scatter of dwells, from which on a notice is given."""
+
 _ACROSS, _ALONG = 0.3, 0.9
 """Forces along the axis, g, below and above which the noise of its dwells is averaged for comparison."""
 
@@ -273,6 +276,16 @@ def noise_along(run: ExaminedRun) -> list[str]:
         f"the white noise of a dwell is {times:.2g} times as large where the axis lies {larger} gravity as {smaller} it"
     )
     return [f"{text}; the dwells are weighted by it; check {cause}"]
+
+
+def less_than_samples(model: Model) -> list[str]:
+    """A notice if the dwells scatter far less than the stated samples let expect; else empty."""
+    error, found = model.problem.lot.error, model.floor()
+    stated = rms(error[np.isfinite(error)])
+    if not model.problem.lot.recorded or stated < _LESS * found:
+        return []
+    text = f"by sd and n the noise of a dwell is {short(MICRO * stated)} µg, and the dwells scatter by {short(MICRO * found)} µg"
+    return [f"{text} only: check the unit of sd, unless a vibration averages out in the means"]
 
 
 def noise_of_the_lot(model: Model, units: int) -> list[str]:

@@ -80,6 +80,17 @@ def test_what_of_the_residual_all_units_have_in_common_is_said_with_its_size(rng
 
 
 @pytest.mark.usefixtures("no_next_measurement")
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_deviations_of_the_samples_in_another_unit_than_the_outputs_are_told(rng, unit: float) -> None:
+    table = lots.lot(rng, units=3, noise_ug=10.0, temperatures=(25.0, 25.0))
+    table[["sd_x", "sd_y", "sd_z"]], table["n"] = unit * 100e-6, 100
+    texts = [text for text in diagnose(table)["warnings"] if "check the unit of sd" in text]
+    assert len(texts) == (unit > 1.0)
+    for text in texts:
+        assert float(text.split(" µg")[0].split()[-1]) == pytest.approx(10000.0, rel=0.01)
+
+
+@pytest.mark.usefixtures("no_next_measurement")
 def test_effects_of_a_table_are_told_to_be_untried_where_its_angles_are_missing(rng) -> None:
     table = lots.lot(rng, units=2, temperatures=(25.0, 25.0))
     angles = ("outer_deg", "inner_deg")
