@@ -9,9 +9,9 @@ import numpy as np
 from inertial.arrays import Array, Places, over
 from inertial.counts import number_of
 from inertial.decisions import CLASS_WIDTH
-from inertial.discovery.driver_sums import DriverSums, gathered
+from inertial.discovery.driver_sums import DriverSums, LotStack, gathered
 from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
-from inertial.discovery.level_fit import WIDE, LevelFit, LevelSizes
+from inertial.discovery.level_fit import WIDE, LevelFit
 from inertial.discovery.naming import Name, Unnamed
 from inertial.discovery.pose_shape import SHAPE, map_of
 from inertial.discovery.running_sums import growth_of
@@ -126,9 +126,14 @@ class Discoveries:
         return [sensor for sensor, _ in self._both]
 
     @cached_property
+    def _of_stations(self) -> LotStack:
+        """The same lots with the sums of the station's columns."""
+        return LotStack.of([station for _, station in self._both])
+
+    @cached_property
     def _station_sums(self) -> DriverSums:
         """Sums of the station's columns by station; those of the evidence are bounded."""
-        return gathered([station for _, station in self._both], [STATION])[STATION]
+        return gathered(self._of_stations, [STATION])[STATION]
 
     def _spread(self, most: int) -> Places:
         count = len(self.state.order)
@@ -233,11 +238,11 @@ class Discoveries:
         row["next"] = "check the station's references (level, encoders, fixture), see 'tumbleline audit'"
         return row
 
-    def _station_fit(self, driver: str, columns: Sequence[int]) -> LevelSizes:
+    def _station_fit(self, driver: str, columns: Sequence[int]) -> LevelFit:
         """Sizes of columns of the station, common to all lots, or by station about their mean."""
-        lots, by = [station for _, station in self._both], MEAN if driver == MEAN else STATION
-        alone = np.eye(len(columns))
-        return LevelFit(lots, gathered(lots, [by])[by], np.array(columns), 1, (alone, alone, alone, alone)).solved()
+        alone, by = np.eye(len(columns)), MEAN if driver == MEAN else STATION
+        sums = gathered(self._of_stations, [by])[by]
+        return LevelFit(self._of_stations, sums, np.array(columns), 1, (alone, alone, alone, alone))
 
     def _station_levels(self, driver: str, columns: Sequence[int]) -> tuple[Array, Array, Array]:
         """Coefficients of columns of the station: common (p,), of each station about it, and standard errors (stations, p)."""
