@@ -18,8 +18,7 @@ class LotStack:
     """Scores of the n units of some lots, one lot after the other.
 
     by_lot : (lots, n), sums units over each lot · lot : (n,), index of the lot of each unit
-    score, own : (n, h), as in a lot · share : (n, h), of each unit in the information of its lot
-    information : (lots, h), of the sums over the units
+    score, own : (n, h), as in a lot · information : (lots, h), of the sums over the units
     """
 
     lots: Sequence[ScoredLot]
@@ -27,7 +26,6 @@ class LotStack:
     lot: Places
     score: Array
     own: Array
-    share: Array
     information: Array
 
     @classmethod
@@ -36,13 +34,17 @@ class LotStack:
         lot = np.repeat(np.arange(len(lots)), [len(each.units) for each in lots])
         by_lot = csr_array((np.ones(lot.size), (lot, np.arange(lot.size))), shape=(len(lots), lot.size))
         score, own = np.concatenate([each.score for each in lots]), np.concatenate([each.own for each in lots])
-        share = own / np.array([each.total for each in lots])[lot]
-        return cls(lots, by_lot, lot, score, own, share, np.array([each.information for each in lots]))
+        return cls(lots, by_lot, lot, score, own, np.array([each.information for each in lots]))
 
     def part(self, part: slice) -> "LotStack":
         """Some of the lots."""
         chosen = np.isin(self.lot, np.arange(len(self.lots))[part])
         return replace(LotStack.of(self.lots[part]), score=self.score[chosen])
+
+    @cached_property
+    def share(self) -> Array:
+        """Share (n, h) of each unit in the information of its lot."""
+        return self.own / np.maximum(self.by_lot @ self.own, 1e-300)[self.lot]
 
     @cached_property
     def sums(self) -> Array:
@@ -76,6 +78,19 @@ class LotStack:
         """Sizes (n, p) of hypotheses ``here`` about the mean of their lot, by information, and these means (lots, p)."""
         means = self.by_lot @ (of_units * self.share[:, here])
         return of_units - means[self.lot], means
+
+    def predicted(
+        self, sizes: tuple[Array, Array], inside: Array, between: Array, here: Places | slice = slice(None)
+    ) -> tuple[Array, Array]:
+        """Scores (n, h) about the mean of a lot, and their sums (lots, h), that sizes of hypotheses ``here`` give.
+
+        Parameters
+        ----------
+        sizes : as of :meth:`about_lots` · inside, between : (p, h), correlations within lots, and in their sums
+        """
+        root, roots = np.sqrt(self.own), np.sqrt(np.maximum(self.information, 0.0))
+        about, of_lots = sizes
+        return root * ((about * root[:, here]) @ inside), roots * ((of_lots * roots[:, here]) @ between)
 
 
 class DriverSums:

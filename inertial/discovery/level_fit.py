@@ -7,6 +7,8 @@ station (White 1980; Liang and Zeger 1986), so that nothing is assumed about the
 or slow; draws of it with random signs by block (wild bootstrap, Cameron, Gelbach and Miller 2008) give its covariance.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import csr_array
 
@@ -58,33 +60,31 @@ class LevelFit:
         *,
         stated: bool = False,
     ) -> None:
-        self._lot, self._by_lot, self._by_level = stack.lot, stack.by_lot, sums.weights(stack)
+        own = stack.own[:, here]
+        weights = own if stated else _weights(stack.own, here, axes)
+        heavier = over(stack.by_lot @ weights, stack.by_lot @ own)
+        score, information = stack.score[:, here] * over(weights, own), stack.information[:, here] * heavier
+        self._stack = replace(stack, score=score, own=weights, information=information)
+        self._by_level, self._levels = sums.weights(stack), len(sums.labels)
         self._inside, self._between, *self._inner = correlations
-        self._levels = len(sums.labels)
         # what the lots of a station have in common is no size of a level, unless the driver is just that
         in_common = sums.driver not in {MEAN, STATION}
         self._common = csr_array(np.eye(int(stack.station.max()) + 1)[stack.station] * in_common)
         self._blocks = _blocks_of(stack.station, max(_BLOCKS, 4 * self._levels))
         # what is not measured has infinite noise: means of lots by slot
         self._noise = np.inf if sums.inside_only else sums.noise[0], sums.noise[1]
-        own, of_lots = stack.own[:, here], stack.information[:, here]
-        self._own = own if stated else _weights(stack.own, here, axes)
-        score, total = stack.score[:, here] * over(self._own, own), self._by_lot @ self._own
-        self._share = self._own / np.maximum(total, 1e-300)[self._lot]
-        self._information = of_lots * over(total, self._by_lot @ own)
-        of_sums = (self._by_lot @ score) * (of_lots > 0.0)
-        left = score - self._share * (self._by_lot @ score)[self._lot]
-        own_sums = sums.information[:, here], self._common.T @ self._information / self._noise[0]
+        own_sums = sums.information[:, here], self._common.T @ information / self._noise[0]
         self._roots = over(1.0, np.sqrt(np.maximum(np.concatenate(own_sums), 0.0)))
         self.weight = sums.units / sums.units.sum()
-        known = own.shape[0] if sums.mixed else int(self._blocks.max()) + 1
+        known = stack.lot.size if sums.mixed else int(self._blocks.max()) + 1
         self._inflation = float(np.sqrt(known / max(known - self._levels, 1)))
-        sizes = self._solution(self._gradient(left, of_sums))
+        left, of_lots = self._stack.left, self._stack.sums
+        sizes = self._solution(self._gradient(left, of_lots))
         explained = self._predicted(sizes)
-        self._after = left, of_sums = left - explained[0], of_sums - explained[1]
+        self._after = left, of_lots = left - explained[0], of_lots - explained[1]
         signs = np.random.default_rng(0).choice([-1.0, 1.0], (0 if stated else _DRAWS, self._blocks.max() + 1))
         errors = [
-            self._solution(self._gradient(left * sign[self._lot, None], of_sums * sign[:, None]))
+            self._solution(self._gradient(left * sign[stack.lot, None], of_lots * sign[:, None]))
             for sign in signs[:, self._blocks]
         ]
         self.sizes = self._levels_of(sizes)
@@ -122,7 +122,7 @@ class LevelFit:
         about, of_lots = self._effects_of(self._solution(full))
         left, sums = self._after
         inside = (about * left).sum(axis=1) / self._noise[1]
-        by_lot = self._by_lot @ inside + (of_lots * sums).sum(axis=1) / self._noise[0]
+        by_lot = self._stack.by_lot @ inside + (of_lots * sums).sum(axis=1) / self._noise[0]
         return self._inflation * float(np.sqrt(np.sum(np.bincount(self._blocks, by_lot) ** 2)))
 
     def _levels_of(self, sizes: Array) -> Array:
@@ -132,20 +132,17 @@ class LevelFit:
 
     def _effects_of(self, sizes: Array) -> tuple[Array, Array]:
         """Sizes of the units about the mean of their lot, and of the means of lots."""
-        of_units = self._by_level @ sizes[: self._levels]
-        means = self._by_lot @ (self._share * of_units)
-        return of_units - means[self._lot], means + self._common @ sizes[self._levels :]
+        about, means = self._stack.about_lots(self._by_level @ sizes[: self._levels])
+        return about, means + self._common @ sizes[self._levels :]
 
     def _predicted(self, sizes: Array) -> tuple[Array, Array]:
         """Scores of the units about the mean of their lot, and their sums, that sizes give."""
-        about, of_lots = self._effects_of(sizes)
-        root, roots = np.sqrt(self._own), np.sqrt(np.maximum(self._information, 0.0))
-        return root * ((about * root) @ self._inside), roots * ((of_lots * roots) @ self._between)
+        return self._stack.predicted(self._effects_of(sizes), self._inside, self._between)
 
     def _gradient(self, left: Array, sums: Array) -> Array:
         """Estimating function (levels + stations, h) of scores of the units and their sums."""
-        within, means = left / self._noise[1], sums / self._noise[0]
-        of_levels = self._by_level.T @ (within + self._share * (means - self._by_lot @ within)[self._lot])
+        within, means, stack = left / self._noise[1], sums / self._noise[0], self._stack
+        of_levels = self._by_level.T @ (within + stack.share * (means - stack.by_lot @ within)[stack.lot])
         return np.concatenate([of_levels, self._common.T @ means])
 
     def _solution(self, target: Array) -> Array:

@@ -19,6 +19,7 @@ from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
 from inertial.discovery.level_fit import WIDE, LevelFit
 from inertial.discovery.pose_shape import SHAPE
 from inertial.discovery.scores import Products, correlations_of
+from inertial.estimation.penalty import price
 
 _MOST = 6
 """Largest number of names of one evaluation."""
@@ -60,6 +61,7 @@ class Name:
     effects, drivers : equivalent ids, best first · score : score of the best
     labels, weights : names of the levels, and their numbers of units
     sizes, errors : (levels, axes), g, rms per dwell and standard errors, by the scatter of the lots
+    by_axis : (axes,), g, rms over the levels, corrected for noise
     square : mean square over levels and axes, g², less what noise adds, and its standard deviation
     """
 
@@ -70,13 +72,8 @@ class Name:
     weights: Array = field(default_factory=lambda: np.zeros(0))
     sizes: Array = field(default_factory=lambda: np.zeros((0, 3)))
     errors: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    by_axis: Array = field(default_factory=lambda: np.zeros(3))
     square: tuple[float, float] = (0.0, 0.0)
-
-    def by_axis(self) -> list[float]:
-        """Rms size of each axis over the levels, g, corrected for noise."""
-        weight = self.weights[:, None] / max(float(self.weights.sum()), 1e-300)
-        squares = np.where(np.isfinite(self.errors), self.sizes**2 - np.nan_to_num(self.errors, posinf=0.0) ** 2, 0.0)
-        return np.sqrt(np.maximum((weight * squares).sum(axis=0), 0.0)).tolist()
 
     def size(self) -> tuple[float, float, float]:
         """Rms size over levels and axes, and the ends of its 95 % interval, g."""
@@ -283,11 +280,9 @@ class Pool:
     def _without(self, stack: LotStack, sums: DriverSums, sizes: Array, *effects: str) -> LotStack:
         """The lots with effects of sizes (levels, axes·p) subtracted from their sums; no dwell is read again."""
         here = self.everywhere(*effects)
-        about, common = stack.about_lots(sums.weights(stack) @ sizes, here)
-        root, roots = np.sqrt(stack.own), np.sqrt(np.maximum(stack.information, 0.0))
-        inside = root * ((about * root[:, here]) @ self.inside[here])
+        moved = stack.about_lots(sums.weights(stack) @ sizes, here)
         # the free errors of the station couple the axes
-        of_lots = roots * ((common * roots[:, here]) @ self.lot[here])
+        inside, of_lots = stack.predicted(moved, self.inside[here], self.lot[here], here)
         return replace(stack, score=stack.score - inside - stack.share * of_lots[stack.lot])
 
     def with_effect(self, lot: ScoredLot, effect: str) -> ScoredLot:
@@ -322,7 +317,7 @@ class Pool:
         z = over(sums.centred[:, here], np.sqrt(np.maximum(info, 0.0)))
         drop, rank = float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
         k = float(np.sum(rank) - (np.count_nonzero(rank) if len(sums.labels) > 1 else 0))
-        return max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
+        return drop - price(drop, k)
 
     def _name(self, driver: str, effect: str, scores: Scores) -> Name:
         """An effect of a driver with those that are equivalent, without its sizes."""
@@ -386,6 +381,7 @@ class Pool:
             weights=sums.units,
             sizes=np.copysign(np.sqrt(np.maximum(squares, 0.0)), largest),
             errors=np.where(errors > 0.0, errors, np.inf),
+            by_axis=np.sqrt(np.maximum([fit.mean_square(part)[0] for part in parts], 0.0)),
             square=(mean / self.axes, deviation / self.axes),
         )
 

@@ -131,9 +131,9 @@ class Discoveries:
         return LotStack.of([station for _, station in self._both])
 
     @cached_property
-    def _station_sums(self) -> DriverSums:
-        """Sums of the station's columns by station; those of the evidence are bounded."""
-        return gathered(self._of_stations, [STATION])[STATION]
+    def _station_sums(self) -> dict[str, DriverSums]:
+        """Sums of the station's columns, common and by station; those of the evidence are bounded."""
+        return gathered(self._of_stations, [MEAN, STATION])
 
     def _spread(self, most: int) -> Places:
         count = len(self.state.order)
@@ -192,7 +192,7 @@ class Discoveries:
 
     def _named_row(self, found: Discovery) -> DiscoveryRow:
         name, state, pool = found.name, self.state, self.source.pool
-        effect, sizes = name.effects[0], name.by_axis()
+        effect, sizes = name.effects[0], name.by_axis
         of_thermometer = {state.effect_of(alarm) for alarm in self._of_thermometer} & set(name.effects)
         scope = ("thermometer", _PROPORTIONAL) if of_thermometer else self._scope(found)
         here = [*pool.everywhere(effect), state.sensor.count + pool.effects.index(effect)]
@@ -217,13 +217,17 @@ class Discoveries:
         effect, column, _ = self.state.hypotheses[alarm.index]
         at = alarm.index - self.state.sensor.size
         here = [k for k, (name, _) in enumerate(self.state.of_station) if name == effect]
-        unit, largest = self._sizes_of_station(here), here.index(at)
-        of_stations, fit = (self._station_fit(driver, here) for driver in (STATION, alarm.driver))
-        square, deviation = fit.mean_square(np.diag(unit**2))
+        unit, largest, alone = self._sizes_of_station(here), here.index(at), np.eye(len(here))
+        fits = {
+            by: LevelFit(self._of_stations, sums, np.array(here), 1, (alone, alone, alone, alone))
+            for by, sums in self._station_sums.items()
+        }
+        square, deviation = fits[_of_reference(alarm.driver)].mean_square(np.diag(unit**2))
         size, low, high = np.sqrt(np.maximum(square + WIDE * deviation * np.array([0.0, -1.0, 1.0]), 0.0)).tolist()
-        common, *_ = self._station_levels(alarm.driver, here)
-        sizes = (unit * (common + of_stations.sizes))[:, largest]
-        errors = unit[largest] * np.sqrt(np.mean(of_stations.errors[..., largest] ** 2, axis=0))
+        common, by_station = self._station_sums[MEAN], self._station_sums[STATION]
+        of_mean = over(common.score, common.information)[:, here] * (len(by_station.labels) > 1)
+        sizes = (unit * (of_mean + fits[STATION].sizes))[:, largest]
+        errors = unit[largest] * np.sqrt(np.mean(fits[STATION].errors[..., largest] ** 2, axis=0))
         drops = sorted(
             (self._explained(a), self.state.effect_of(a)) for a in self._of_station if a.driver == alarm.driver
         )
@@ -233,29 +237,15 @@ class Discoveries:
         row["kind"] = "slope" if alarm.driver == DATE else row["kind"]
         row["levels"] = [
             {"level": label, "axis": "", "size_ug": MICRO * value, "u_ug": MICRO * error, "units": 0}
-            for label, value, error in zip(self._station_sums.labels, sizes.tolist(), errors.tolist(), strict=True)
+            for label, value, error in zip(by_station.labels, sizes.tolist(), errors.tolist(), strict=True)
         ]
         row["next"] = "check the station's references (level, encoders, fixture), see 'tumbleline audit'"
         return row
 
-    def _station_fit(self, driver: str, columns: Sequence[int]) -> LevelFit:
-        """Sizes of columns of the station, common to all lots, or by station about their mean."""
-        alone, by = np.eye(len(columns)), MEAN if driver == MEAN else STATION
-        sums = gathered(self._of_stations, [by])[by]
-        return LevelFit(self._of_stations, sums, np.array(columns), 1, (alone, alone, alone, alone))
-
-    def _station_levels(self, driver: str, columns: Sequence[int]) -> tuple[Array, Array, Array]:
-        """Coefficients of columns of the station: common (p,), of each station about it, and standard errors (stations, p)."""
-        sums = self._station_sums
-        score, information = sums.score[:, columns], np.maximum(sums.information[:, columns], 1e-300)
-        several = driver == MEAN or len(score) > 1
-        common = score.sum(axis=0) / information.sum(axis=0) * several
-        return common, score / information - common, 1.0 / np.sqrt(information)
-
     def _explained(self, alarm: Alarm) -> float:
         """Reduction of the chi-square of all lots by a column of the station, common to all stations or about their mean."""
-        common, about, errors = self._station_levels(alarm.driver, [alarm.index - self.state.sensor.size])
-        return float(np.sum(((common if alarm.driver == MEAN else about) / errors) ** 2))
+        sums, at = self._station_sums[_of_reference(alarm.driver)], alarm.index - self.state.sensor.size
+        return float(over(sums.centred[:, at] ** 2, sums.information[:, at]).sum())
 
     def _sizes_of_station(self, columns: Sequence[int]) -> Array:
         """Rms over the dwells, g, of columns (p,) of the station with coefficient one, of what the model of a lot leaves of them.
@@ -351,9 +341,14 @@ def plain(driver: str) -> str:
     return driver.removesuffix(INSIDE)
 
 
+def _of_reference(driver: str) -> str:
+    """The driver by which the sizes of an error of the references are told: of a date, the station."""
+    return MEAN if driver == MEAN else STATION
+
+
 def _levels_of(name: Name) -> list[DiscoveredLevel]:
     """The levels on the axis with the largest differences, in order of size."""
-    axis = int(np.argmax(name.by_axis()))
+    axis = int(np.argmax(name.by_axis))
     order = np.argsort(-np.abs(name.sizes[:, axis]))[:_SHOWN_LEVELS]
     return [
         {
