@@ -140,7 +140,7 @@ class DriverSums:
         share = by_cell @ stack.share
         inside = (by_cell.power(2) @ stack.own - share * (by_cell @ stack.own)) / within
         common = np.zeros_like(inside)
-        self.score = by_level @ (by_cell @ stack.left) / within
+        self.score = weights.T @ stack.left / within
         if not self.inside_only:
             centre = share if middle is None else (middle[lots] - self.about)[:, None]
             common = centre**2 * stack.information[lots] / between

@@ -18,7 +18,7 @@ from inertial.discovery.driver_sums import DriverSums, LotStack, gathered
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
 from inertial.discovery.level_fit import WIDE, LevelFit
 from inertial.discovery.pose_shape import SHAPE
-from inertial.discovery.scores import Products, correlations_of
+from inertial.discovery.scores import Products, correlations_of, inverse_of
 from inertial.estimation.penalty import price
 
 _MOST = 6
@@ -196,7 +196,7 @@ class Pool:
         """The sizes of effects by a driver, which has the sums over the lots."""
         here = self.everywhere(*effects)
         within, of_means = (products[np.ix_(here, here)] for products in (self.inside, self.lot))
-        among = within, of_means, self._inner(sums, *effects), _inverse(of_means)
+        among = within, of_means, self._inner(sums, *effects), inverse_of(of_means, _SEEN)
         return LevelFit(stack, sums, here, self.axes, among, stated=stated)
 
     def _raised(self, pair: tuple[str, str], alarmed: Iterable[tuple[str, str]]) -> bool:
@@ -308,7 +308,7 @@ class Pool:
         effect would seem to explain three times the actual chi-square.
         """
         here = self.everywhere(*effects)
-        return _inverse((self.inside if sums.mixed else self.lot)[np.ix_(here, here)])
+        return inverse_of((self.inside if sums.mixed else self.lot)[np.ix_(here, here)], _SEEN)
 
     def score(self, sums: DriverSums, effect: str) -> float:
         """Score of an effect for a driver: the reduction of chi-square by its columns less the price of their coefficients."""
@@ -386,11 +386,6 @@ class Pool:
         )
 
 
-def _inverse(products: Array) -> Array:
-    """Pseudo-inverse of correlations, without combinations that are not seen."""
-    return np.linalg.pinv(products, rcond=_SEEN, hermitian=True).astype(np.float64)
-
-
 def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float) -> set[int]:
     """Indices of names that are parts of a function of pose outside the catalogue: together they explain less than it does.
 
@@ -411,7 +406,7 @@ def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float)
 
 def _eliminated(values: Array, information: Array, products: Array, at: Places) -> tuple[Array, Array]:
     """Scores and information (n, h) after elimination of the columns ``at``, by correlations (h, h)."""
-    inner = np.linalg.pinv(products[np.ix_(at, at)], rcond=1e-6, hermitian=True)
+    inner = inverse_of(products[np.ix_(at, at)], 1e-6)
     root = np.sqrt(np.maximum(information, 0.0))
     values = values - root * (over(values, root)[:, at] @ inner @ products[at])
     covered = np.einsum("jp,pq,qj->j", products[:, at], inner, products[at])

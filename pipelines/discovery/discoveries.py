@@ -253,11 +253,9 @@ class Discoveries:
         Their information per unit and axis, beside that of functions of the pose, whose size is known.
         """
         here = self.source.pool.everywhere(SHAPE)
-        both = [
-            (sensor.own[:, here].mean(axis=0), station.information[columns] / (AXES * len(sensor.units)))
-            for sensor, station in self._both
-        ]
-        own, of_station = (np.mean(np.array(part), axis=0) for part in zip(*both, strict=True))
+        own = np.mean([sensor.own[:, here].mean(axis=0) for sensor in self._lots], axis=0)
+        units = np.array([[len(sensor.units)] for sensor in self._lots])
+        of_station = np.mean(self._of_stations.information[:, columns] / (AXES * units), axis=0)
         return np.sqrt(of_station / np.median(over(own, self.source.pool.size[here] ** 2)))
 
     def _thermometer_row(self) -> DiscoveryRow:

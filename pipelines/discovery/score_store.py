@@ -28,7 +28,7 @@ from schemas.errors import ArchiveUnusable
 from schemas.units import MICRO
 
 FOLDER = "discovery"
-VERSION = 5
+VERSION = 6
 AXES = 3
 MOST_OPEN = 32  # files whose rows are kept in memory: units measured repeatedly were often measured together
 BATCH = 8  # runs that one process scores at a time
@@ -150,7 +150,7 @@ def content_of(data: bytes) -> tuple[pa.Table, dict[str, Products]] | None:
         for name, (sensor, station, lots) in about["columns"].items():
             if name:
                 columns, of_station = (tuple((str(e), int(k)) for e, k in listed) for listed in (sensor, station))
-                parts = {key: arrays[f"{name}/{key}"] for key in ("size", "within", "across", "inside")}
+                parts = {key: arrays[f"{name}/{key}"] for key in ("size", "lot", "inside")}
                 products[name] = Products(columns, of_station, *_unfolded(parts, len(columns)), lots=int(lots))
     return table, products
 
@@ -200,33 +200,28 @@ def _unpacked(row: Mapping[str, Any], products: Products) -> LotScores:
     )
 
 
+def _steps(k: int) -> Array:
+    """Steps per unit correlation of columns, (3·k, 3·k)."""
+    return np.where(np.kron(np.eye(AXES), np.ones((k, k))) > 0.0, _WITHIN, _ACROSS)
+
+
 def _folded(products: Products) -> dict[str, NDArray[Any]]:
-    """Correlations of columns on one axis and on two, for sums over units, and within lots; and the sizes."""
+    """Upper triangles of the correlations of columns, for sums over units, and within lots; and the sizes."""
     k = len(products.columns)
-    upper, lot = np.triu_indices(k), correlations_of(products.lot).reshape(AXES, k, AXES, k)
-    within = np.stack([lot[axis, :, axis] for axis in range(AXES)])
-    across = np.stack([lot[axis, :, axis - 1] for axis in range(AXES)])
-    parts = {
-        "within": _WITHIN * within[:, *upper],
-        "across": _ACROSS * across,
-        "inside": _WITHIN * correlations_of(products.inside)[:, *upper],
-    }
-    size = {"size": products.size.astype(np.float32)}
-    return size | {name: np.frombuffer(_planes(steps), dtype=np.uint8) for name, steps in parts.items()}
+    lot, inside = _steps(k) * correlations_of(products.lot), _WITHIN * correlations_of(products.inside)
+    upper = {"lot": lot[np.triu_indices(len(lot))], "inside": inside[:, *np.triu_indices(k)]}
+    packed = {name: np.frombuffer(_planes(values), dtype=np.uint8) for name, values in upper.items()}
+    return packed | {"size": products.size.astype(np.float32)}
 
 
 def _unfolded(parts: Mapping[str, NDArray[Any]], k: int) -> tuple[Array, Array, Array]:
     """Correlations (3·k, 3·k) and (3, k, k) and sizes (3·k,), of :func:`_folded`."""
-    upper, lot = np.triu_indices(k), np.zeros((AXES, k, AXES, k))
-    inside, within = np.zeros((2, AXES, k, k))
-    for kind, square in (("inside", inside), ("within", within)):
-        square[:, *upper] = _of_planes(parts[kind].tobytes()).reshape(AXES, -1) / _WITHIN
+    lot, inside = np.zeros((1, AXES * k, AXES * k)), np.zeros((AXES, k, k))
+    for name, square in (("lot", lot), ("inside", inside)):
+        upper = np.triu_indices(square.shape[-1])
+        square[:, *upper] = _of_planes(parts[name].tobytes()).reshape(len(square), -1)
         square[:, *upper[::-1]] = square[:, *upper]
-    across = _of_planes(parts["across"].tobytes()).reshape(AXES, k, k) / _ACROSS
-    for axis in range(AXES):
-        lot[axis, :, axis] = within[axis]
-        lot[axis, :, axis - 1], lot[axis - 1, :, axis] = across[axis], across[axis].T
-    return lot.reshape(AXES * k, AXES * k), inside, parts["size"].astype(np.float64)
+    return lot[0] / _steps(k), inside / _WITHIN, parts["size"].astype(np.float64)
 
 
 def _planes(values: Array) -> bytes:
