@@ -3,7 +3,8 @@
 import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +14,7 @@ from inertial.arrays import NORMAL_MEDIAN, Array, Places, over
 from inertial.discovery.evidence import SLOPE, SLOT, UNIT, ScoredLot
 
 
-@dataclass(frozen=True)
+@dataclass
 class LotStack:
     """Scores of the n units of some lots, one lot after the other.
 
@@ -39,19 +40,25 @@ class LotStack:
     def part(self, part: slice) -> "LotStack":
         """Some of the lots."""
         chosen = np.isin(self.lot, np.arange(len(self.lots))[part])
-        return replace(LotStack.of(self.lots[part]), score=self.score[chosen])
+        return LotStack.of(self.lots[part]).with_score(self.score[chosen])
+
+    def with_score(self, score: Array) -> "LotStack":
+        """The same lots with other scores; what does not depend on these is shared, as an archive has many lots."""
+        other = copy(self)
+        other.score = score
+        return other
 
     @cached_property
     def share(self) -> Array:
         """Share (n, h) of each unit in the information of its lot."""
         return self.own / np.maximum(self.by_lot @ self.own, 1e-300)[self.lot]
 
-    @cached_property
+    @property
     def sums(self) -> Array:
         """Scores (lots, h) summed over the units; zero where a lot has no information."""
         return np.where(self.information > 0.0, self.by_lot @ self.score, 0.0)
 
-    @cached_property
+    @property
     def left(self) -> Array:
         """Scores (n, h) of the units about the mean of their lot."""
         return self.score - self.share * (self.by_lot @ self.score)[self.lot]
@@ -105,12 +112,19 @@ class DriverSums:
 
     Parameters
     ----------
+    left : (n, h), scores of the units about the mean of their lot
     means : (lots, h), mean size of the lots of the station of each
     seen : number of lots of each unit; one alone tells nothing
     """
 
     def __init__(
-        self, driver: str, stack: LotStack, noise: tuple[float, float], means: Array, seen: Mapping[str, int]
+        self,
+        driver: str,
+        stack: LotStack,
+        left: Array,
+        noise: tuple[float, float],
+        means: Array,
+        seen: Mapping[str, int],
     ) -> None:
         self.driver, self.noise, self.about, self.spread = driver, noise, 0.0, 1.0
         self.inside_only = driver in {SLOT, UNIT}
@@ -140,7 +154,7 @@ class DriverSums:
         share = by_cell @ stack.share
         inside = (by_cell.power(2) @ stack.own - share * (by_cell @ stack.own)) / within
         common = np.zeros_like(inside)
-        self.score = weights.T @ stack.left / within
+        self.score = weights.T @ left / within
         if not self.inside_only:
             centre = share if middle is None else (middle[lots] - self.about)[:, None]
             common = centre**2 * stack.information[lots] / between
@@ -182,13 +196,14 @@ def gathered(stack: LotStack, drivers: Sequence[str], compared: Sequence[ScoredL
     """
     by_station = csr_array(np.eye(int(stack.station.max(initial=-1)) + 1)[stack.station]).T
     means = over(by_station @ stack.sums, by_station @ stack.information)[stack.station]
-    noise = _noise(stack, means)
+    left = stack.left
+    noise = _noise(stack, left, means)
     seen = Counter(unit for lot in (*stack.lots, *compared) for unit in lot.units)
-    out = {name: DriverSums(name, stack, noise, means, seen) for name in drivers}
+    out = {name: DriverSums(name, stack, left, noise, means, seen) for name in drivers}
     return {name: sums for name, sums in out.items() if sums.labels}
 
 
-def _noise(stack: LotStack, means: Array) -> tuple[float, float]:
+def _noise(stack: LotStack, left: Array, means: Array) -> tuple[float, float]:
     """Variance over the stated one, of lots about their station's mean and of units within lots; medians over all.
 
     What is not measured has infinite noise: units of lots that have one.
@@ -196,7 +211,7 @@ def _noise(stack: LotStack, means: Array) -> tuple[float, float]:
     info = np.where(stack.information > 0.0, stack.information, np.nan)
     between = (stack.sums - stack.information * means) ** 2 / info
     free = stack.own * (1.0 - stack.share)
-    within = stack.by_lot @ (stack.left**2 / np.where(free > 0.0, free, np.nan)) / np.bincount(stack.lot)[:, None]
+    within = stack.by_lot @ (left**2 / np.where(free > 0.0, free, np.nan)) / np.bincount(stack.lot)[:, None]
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # an effect that no lot shows is nan for all of them
         many = np.nanmedian(np.clip(between, 0.0, np.nanquantile(between, 0.99)), axis=0) / NORMAL_MEDIAN**2

@@ -283,7 +283,7 @@ class Pool:
         moved = stack.about_lots(sums.weights(stack) @ sizes, here)
         # the free errors of the station couple the axes
         inside, of_lots = stack.predicted(moved, self.inside[here], self.lot[here], here)
-        return replace(stack, score=stack.score - inside - stack.share * of_lots[stack.lot])
+        return stack.with_score(stack.score - inside - stack.share * of_lots[stack.lot])
 
     def with_effect(self, lot: ScoredLot, effect: str) -> ScoredLot:
         """A lot with an effect added to its model, with coefficients of every unit and axis: U_j − I_jk U_k / I_kk."""

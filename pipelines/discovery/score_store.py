@@ -9,7 +9,7 @@ import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,7 @@ class ScoreStore:
     def __init__(self, archive: Archive) -> None:
         self.archive = archive
         self.folder: Place = archive.root / FOLDER / "scores"
-        self._opened: dict[Place, pa.Table] = {}
+        self._opened = lru_cache(MOST_OPEN)(_rows_of)
 
     @cached_property
     def _all(self) -> tuple[dict[str, dict[str, Any]], dict[str, Products]]:
@@ -82,15 +82,8 @@ class ScoreStore:
 
     def run(self, run: str) -> ScoredRun:
         """The scores of a run."""
-        path = self.heads[run]["file"]
-        if path not in self._opened:
-            read = content_of(derived.unframed(path)[0])
-            if read is None:
-                raise ArchiveUnusable(f"{path}: the scores were changed while they were read; run it again")
-            while len(self._opened) >= MOST_OPEN:
-                self._opened.pop(next(iter(self._opened)))
-            self._opened[path] = read[0]
-        return run_of(self._opened[path].slice(self.heads[run]["row"], 1).to_pylist()[0], self._all[1])
+        head = self.heads[run]
+        return run_of(self._opened(head["file"]).slice(head["row"], 1).to_pylist()[0], self._all[1])
 
     def add(self, ids: Sequence[str], workers: int, distribute: Distributor | None = None) -> int:
         """Score runs without scores, in parallel processes; returns the number of newly scored runs."""
@@ -104,7 +97,7 @@ class ScoreStore:
             return 0
         number = 1 + max((int(path.name.split(".")[0]) for path in self._paths()), default=0)
         files.publish(self.folder / f"{number:06d}.scores", derived.framed(written(scored)))
-        self._opened.clear()
+        self._opened.cache_clear()
         self.__dict__.pop("_all", None)
         return len(scored)
 
@@ -153,6 +146,14 @@ def content_of(data: bytes) -> tuple[pa.Table, dict[str, Products]] | None:
                 parts = {key: arrays[f"{name}/{key}"] for key in ("size", "lot", "inside")}
                 products[name] = Products(columns, of_station, *_unfolded(parts, len(columns)), lots=int(lots))
     return table, products
+
+
+def _rows_of(path: Place) -> pa.Table:
+    """The rows of a file of scores that was sound before."""
+    read = content_of(derived.unframed(path)[0])
+    if read is None:
+        raise ArchiveUnusable(f"{path}: the scores were changed while they were read; run it again")
+    return read[0]
 
 
 def run_of(row: Mapping[str, Any], products: Mapping[str, Products]) -> ScoredRun:
