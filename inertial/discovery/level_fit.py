@@ -7,15 +7,14 @@ station (White 1980; Liang and Zeger 1986), so that nothing is assumed about the
 or slow; draws of it with random signs by block (wild bootstrap, Cameron, Gelbach and Miller 2008) give its covariance.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from inertial.arrays import Array, Places, over
-from inertial.discovery.driver_sums import DriverSums
-from inertial.discovery.evidence import MEAN, STATION, ScoredLot
+from inertial.discovery.driver_sums import DriverSums, LotStack
+from inertial.discovery.evidence import MEAN, STATION
 
 _BLOCKS = 20
 """Number of blocks of consecutive lots of a station, if there are as many lots: the standard errors have a scatter of
@@ -36,16 +35,61 @@ _CLOSE, _MOST = 1e-8, 60
 """Part of the first chi-square at which the iteration ends, 1e-4 of the sizes, and the largest number of iterations."""
 
 
-@dataclass(frozen=True)
-class LevelSizes:
+class LevelFit:
     """Sizes of the columns of an effect by level, about the mean of the units where there are several levels.
 
     sizes : (levels, h), g per unit of the column · errors : (n, levels, h), draws of their errors
+    weight : (levels,), share of the units
+
+    Parameters
+    ----------
+    sums : of the driver over the lots of the stack · here : indices of the h hypotheses of the effect, axis by axis
+    correlations : (h, h) each, of the columns within lots, in the means of lots; inverses without what lots do not separate, of
+        those that apply to the driver, and in the means of lots
+    stated : weigh the units by the noise they state, as the scores of names do, so that no chi-square by it is left, and draw no
+        errors
     """
 
-    sizes: Array
-    errors: Array
-    _fit: "LevelFit"
+    def __init__(
+        self,
+        stack: LotStack,
+        sums: DriverSums,
+        here: Places,
+        axes: int,
+        correlations: tuple[Array, Array, Array, Array],
+        *,
+        stated: bool = False,
+    ) -> None:
+        own = stack.own[:, here]
+        weights = own if stated else _weights(stack.own, here, axes)
+        heavier = over(stack.by_lot @ weights, stack.by_lot @ own)
+        score, information = stack.score[:, here] * over(weights, own), stack.information[:, here] * heavier
+        self._stack = replace(stack, score=score, own=weights, information=information)
+        self._by_level, self._levels = sums.weights(stack), len(sums.labels)
+        self._inside, self._between, *self._inner = correlations
+        # what the lots of a station have in common is no size of a level, unless the driver is just that
+        in_common = sums.driver not in {MEAN, STATION}
+        self._common = csr_array(np.eye(int(stack.station.max()) + 1)[stack.station] * in_common)
+        self._blocks = _blocks_of(stack.station, max(_BLOCKS, 4 * self._levels))
+        # what is not measured has infinite noise: means of lots by slot
+        self._noise = np.inf if sums.inside_only else sums.noise[0], sums.noise[1]
+        own_sums = sums.information[:, here], self._common.T @ information / self._noise[0]
+        self._roots = over(1.0, np.sqrt(np.maximum(np.concatenate(own_sums), 0.0)))
+        self.weight = sums.units / sums.units.sum()
+        known = stack.lot.size if sums.mixed else int(self._blocks.max()) + 1
+        self._inflation = float(np.sqrt(known / max(known - self._levels, 1)))
+        left, of_lots = self._stack.left, self._stack.sums
+        sizes = self._solution(self._gradient(left, of_lots))
+        explained = self._predicted(sizes)
+        self._after = left, of_lots = left - explained[0], of_lots - explained[1]
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], (0 if stated else _DRAWS, self._blocks.max() + 1))
+        errors = [
+            self._solution(self._gradient(left * sign[stack.lot, None], of_lots * sign[:, None]))
+            for sign in signs[:, self._blocks]
+        ]
+        self.sizes = self._levels_of(sizes)
+        drawn = np.array([self._levels_of(each) for each in errors]).reshape(-1, *self.sizes.shape)
+        self.errors = self._inflation * drawn
 
     def mean_square(self, product: Array) -> tuple[float, float]:
         """Mean of sᵀ·product·s over the units, less what noise adds to it, and its standard deviation.
@@ -54,122 +98,51 @@ class LevelSizes:
         ----------
         product : (h, h), symmetric
         """
-        weight = self._fit.weight
-        noise = np.einsum("g,ngp,pq,ngq->n", weight, self.errors, product, self.errors)
-        value = float(np.einsum("g,gp,pq,gq->", weight, self.sizes, product, self.sizes))
-        linear = 2.0 * self._fit.scatter_of(weight[:, None] * (self.sizes @ product))
+        noise = np.einsum("g,ngp,pq,ngq->n", self.weight, self.errors, product, self.errors)
+        value = float(np.einsum("g,gp,pq,gq->", self.weight, self.sizes, product, self.sizes))
+        linear = 2.0 * self._scatter_of(self.weight[:, None] * (self.sizes @ product))
         twice = float(noise.var())
         # the sizes have noise, too, which adds 2·twice to the linear part
         return value - float(noise.mean()), float(np.sqrt(max(linear**2 - twice, twice)))
 
-
-class LevelFit:
-    """The normal equations of an effect by a driver.
-
-    Parameters
-    ----------
-    sums : of the driver over these lots · here : indices of the h hypotheses of the effect, axis by axis
-    correlations : (h, h) each, of the columns within lots, in the means of lots; inverses without what lots do not separate, of
-        those that apply to the driver, and in the means of lots
-    stated : weigh the units by the noise they state, as the scores of names do, so that no chi-square by it is left
-    """
-
-    def __init__(
-        self,
-        lots: Sequence[ScoredLot],
-        sums: DriverSums,
-        here: Places,
-        axes: int,
-        correlations: tuple[Array, Array, Array, Array],
-        *,
-        stated: bool = False,
-    ) -> None:
-        count = np.array([len(lot.units) for lot in lots])
-        self._lot = np.repeat(np.arange(len(lots)), count)
-        self._inside, self._between, *self._inner = correlations
-        cells: list[tuple[Array, Places, Places]] = []
-        for lot, first in zip(lots, np.cumsum(count) - count, strict=True):
-            weights = sums.weights(lot)
-            unit, level = np.nonzero(weights)
-            cells.append((weights[unit, level], unit + first, level))
-        self.levels, units = len(sums.labels), int(count.sum())
-        values, rows, columns = map(np.concatenate, zip(*cells, strict=True))
-        self._by_level = csr_array((values, (rows, columns)), shape=(units, self.levels))
-        self._by_lot = csr_array((np.ones(units), (self._lot, np.arange(units))), shape=(len(lots), units))
-        stations = list(dict.fromkeys(lot.station for lot in lots))
-        at = np.array([stations.index(lot.station) for lot in lots])
-        # what the lots of a station have in common is no size of a level, unless the driver is just that
-        self._common = csr_array(np.eye(len(stations))[at] * (sums.driver not in {MEAN, STATION}))
-        self._blocks = _blocks_of(at, max(_BLOCKS, 4 * self.levels))
-        # what is not measured has infinite noise: means of lots by slot, and units of a lot that has one
-        between, within = sums.noise
-        self._noise = np.inf if sums.inside_only else between, within if np.isfinite(within) else np.inf
-        own = np.concatenate([lot.own[:, here] for lot in lots])
-        self._own = own if stated else _weights(lots, here, axes)
-        score = np.concatenate([lot.score[:, here] for lot in lots]) * over(self._own, own)
-        total, of_lots = self._by_lot @ self._own, np.array([lot.information[here] for lot in lots])
-        self._share = self._own / np.maximum(total, 1e-300)[self._lot]
-        self._information = of_lots * over(total, self._by_lot @ own)
-        self._sums = (self._by_lot @ score) * (of_lots > 0.0)
-        self._left = score - self._share * (self._by_lot @ score)[self._lot]
-        own_sums = sums.information[:, here], self._common.T @ self._information / self._noise[0]
-        self._roots = over(1.0, np.sqrt(np.maximum(np.concatenate(own_sums), 0.0)))
-        of_level = np.array(list(sums.units.values()), dtype=np.float64)
-        self.weight = of_level / of_level.sum()
-        self._about, known = self.levels > 1, units if sums.mixed else int(self._blocks.max()) + 1
-        self._inflation = float(np.sqrt(known / max(known - self.levels, 1)))
-
-    def solved(self, draws: int = _DRAWS, seed: int = 0) -> LevelSizes:
-        """The sizes of all levels and columns, with draws of their errors."""
-        sizes = self._solution(self._gradient(self._left, self._sums))
-        left, sums = self._predicted(sizes)
-        self._after = left, sums = self._left - left, self._sums - sums
-        rng = np.random.default_rng(seed)
-        errors = [
-            self._solution(self._gradient(left * sign[self._lot, None], sums * sign[:, None]))
-            for sign in rng.choice([-1.0, 1.0], (draws, self._blocks.max() + 1))[:, self._blocks]
-        ]
-        drawn = np.array([self._levels_of(each) for each in errors]).reshape(draws, self.levels, sizes.shape[1])
-        return LevelSizes(self._levels_of(sizes), self._inflation * drawn, self)
-
     @property
-    def stated_variance(self) -> Array:
-        """Variance (levels, h) of the sizes by the noise that the scores are divided by."""
-        return self._roots[: self.levels] ** 2 * np.diag(self._inner[0])
+    def shrunk(self) -> Array:
+        """Sizes (levels, h), those of several levels shrunk towards zero according to the noise that scores are divided by."""
+        if self._levels < 2:
+            return self.sizes
+        noise, squares = self._roots[: self._levels] ** 2 @ np.diag(self._inner[0]), (self.sizes**2).sum(axis=1)
+        return self.sizes * np.clip(1.0 - noise / np.maximum(squares, 1e-300), 0.0, 1.0)[:, None]
 
-    def scatter_of(self, direction: Array) -> float:
+    def _scatter_of(self, direction: Array) -> float:
         """Standard deviation of Σ direction·size, (levels, h), by the scatter between blocks of lots."""
-        if self._about:
+        if self._levels > 1:
             direction = direction - self.weight[:, None] * direction.sum(axis=0)
         full = np.zeros_like(self._roots)
-        full[: self.levels] = direction
+        full[: self._levels] = direction
         about, of_lots = self._effects_of(self._solution(full))
         left, sums = self._after
         inside = (about * left).sum(axis=1) / self._noise[1]
-        by_lot = self._by_lot @ inside + (of_lots * sums).sum(axis=1) / self._noise[0]
+        by_lot = self._stack.by_lot @ inside + (of_lots * sums).sum(axis=1) / self._noise[0]
         return self._inflation * float(np.sqrt(np.sum(np.bincount(self._blocks, by_lot) ** 2)))
 
     def _levels_of(self, sizes: Array) -> Array:
         """Sizes of the levels about the mean of the units."""
-        of_levels = sizes[: self.levels]
-        return of_levels - self.weight @ of_levels if self._about else of_levels
+        of_levels = sizes[: self._levels]
+        return of_levels - self.weight @ of_levels if self._levels > 1 else of_levels
 
     def _effects_of(self, sizes: Array) -> tuple[Array, Array]:
         """Sizes of the units about the mean of their lot, and of the means of lots."""
-        of_units = self._by_level @ sizes[: self.levels]
-        means = self._by_lot @ (self._share * of_units)
-        return of_units - means[self._lot], means + self._common @ sizes[self.levels :]
+        about, means = self._stack.about_lots(self._by_level @ sizes[: self._levels])
+        return about, means + self._common @ sizes[self._levels :]
 
     def _predicted(self, sizes: Array) -> tuple[Array, Array]:
         """Scores of the units about the mean of their lot, and their sums, that sizes give."""
-        about, of_lots = self._effects_of(sizes)
-        root, roots = np.sqrt(self._own), np.sqrt(np.maximum(self._information, 0.0))
-        return root * ((about * root) @ self._inside), roots * ((of_lots * roots) @ self._between)
+        return self._stack.predicted(self._effects_of(sizes), self._inside, self._between)
 
     def _gradient(self, left: Array, sums: Array) -> Array:
         """Estimating function (levels + stations, h) of scores of the units and their sums."""
-        within, means = left / self._noise[1], sums / self._noise[0]
-        of_levels = self._by_level.T @ (within + self._share * (means - self._by_lot @ within)[self._lot])
+        within, means, stack = left / self._noise[1], sums / self._noise[0], self._stack
+        of_levels = self._by_level.T @ (within + stack.share * (means - stack.by_lot @ within)[stack.lot])
         return np.concatenate([of_levels, self._common.T @ means])
 
     def _solution(self, target: Array) -> Array:
@@ -193,17 +166,16 @@ class LevelFit:
     def _near(self, left: Array) -> Array:
         """Solution without the ties between levels."""
         scaled = self._roots * left
-        parts = (scaled[: self.levels] @ self._inner[0], scaled[self.levels :] @ self._inner[1])
+        parts = (scaled[: self._levels] @ self._inner[0], scaled[self._levels :] @ self._inner[1])
         return self._roots * np.concatenate(parts)
 
 
-def _weights(lots: Sequence[ScoredLot], here: Places, axes: int) -> Array:
-    """Information (units, h) of the units, by the noise that most columns of their other axes state.
+def _weights(every: Array, here: Places, axes: int) -> Array:
+    """Information (n, h) of units, of all hypotheses in ``every``, by the noise that most columns of their other axes state.
 
     A lot states its noise by what its model leaves, which the effect and the error along it are in: where both have the same sign
     it counts for less, which takes 2/ν of the effect at ν degrees of freedom: 3 % at 60, and more of an effect as slow as wander.
     """
-    every = np.concatenate([lot.own for lot in lots])
     typical = every.mean(axis=0)
     relative = over(every, typical).reshape(len(every), axes, -1)
     each = np.median(relative, axis=2)

@@ -5,7 +5,7 @@ D − k(1 + ln(D/k)), the price of coefficients with estimated variance. Effects
 is subtracted from all sums by the products of the columns, and the remainder is searched again, finally for any function of pose.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,11 +14,12 @@ from scipy.linalg import block_diag
 from inertial import effects as effects_catalogue
 from inertial.arrays import Array, Places, over
 from inertial.decisions import CLASS_WIDTH
-from inertial.discovery.driver_sums import DriverSums, gathered
+from inertial.discovery.driver_sums import DriverSums, LotStack, gathered
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
-from inertial.discovery.level_fit import WIDE, LevelFit, LevelSizes
+from inertial.discovery.level_fit import WIDE, LevelFit
 from inertial.discovery.pose_shape import SHAPE
-from inertial.discovery.scores import Products, correlations_of
+from inertial.discovery.scores import Products, correlations_of, inverse_of
+from inertial.estimation.penalty import price
 
 _MOST = 6
 """Largest number of names of one evaluation."""
@@ -60,6 +61,7 @@ class Name:
     effects, drivers : equivalent ids, best first · score : score of the best
     labels, weights : names of the levels, and their numbers of units
     sizes, errors : (levels, axes), g, rms per dwell and standard errors, by the scatter of the lots
+    by_axis : (axes,), g, rms over the levels, corrected for noise
     square : mean square over levels and axes, g², less what noise adds, and its standard deviation
     """
 
@@ -70,13 +72,8 @@ class Name:
     weights: Array = field(default_factory=lambda: np.zeros(0))
     sizes: Array = field(default_factory=lambda: np.zeros((0, 3)))
     errors: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    by_axis: Array = field(default_factory=lambda: np.zeros(3))
     square: tuple[float, float] = (0.0, 0.0)
-
-    def by_axis(self) -> list[float]:
-        """Rms size of each axis over the levels, g, corrected for noise."""
-        weight = self.weights[:, None] / max(float(self.weights.sum()), 1e-300)
-        squares = np.where(np.isfinite(self.errors), self.sizes**2 - np.nan_to_num(self.errors, posinf=0.0) ** 2, 0.0)
-        return np.sqrt(np.maximum((weight * squares).sum(axis=0), 0.0)).tolist()
 
     def size(self) -> tuple[float, float, float]:
         """Rms size over levels and axes, and the ends of its 95 % interval, g."""
@@ -104,7 +101,8 @@ class Pool:
 
     def __init__(self, products: Products) -> None:
         self.columns, self.size, self.axes = products.columns, products.size, len(products.inside)
-        self.lot, self.inside = correlations_of(products.lot), correlations_of(products.inside)
+        self.lot = correlations_of(products.lot)
+        self.inside = correlations_of(np.asarray(block_diag(*products.inside), dtype=np.float64))
         self.effects = list(dict.fromkeys(effect for effect, _ in self.columns))
         # indicator (h, effects), 1 where a hypothesis belongs to an effect
         belongs = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
@@ -122,10 +120,11 @@ class Pool:
         """
         alarmed = {(name.removesuffix(INSIDE), effect) for name, effect in alarms}
         drivers = list(dict.fromkeys(name for name, _ in sorted(alarmed)))
-        found, every = list[Name](), lots
+        found, stack = list[Name](), LotStack.of(lots)
+        left = stack
         of_pose: list[Scores] = []  # scores of any function of pose by driver, before each name and after the last
         while True:
-            _, scores, significant = self._judged(lots, drivers, needed)
+            _, scores, significant = self._judged(left, drivers, needed)
             of_pose.append({pair: score for pair, score in scores.items() if pair[1] == SHAPE})
             if found:
                 # what the best of a class does not take away is another effect, with the same score by chance
@@ -144,54 +143,48 @@ class Pool:
             name = next((name for name in every_name if not self._already_named(found, name)), None)
             if name is None or len(found) == _MOST:
                 break
-            lots = self._subtracted(lots, name.drivers[0], name.effects[0])
+            left = self._subtracted(left, name.drivers[0], name.effects[0])
             found.append(name)
         imitations = _imitations(found, of_pose, needed)
         found = [name for at, name in enumerate(found) if at not in imitations]
-        sized, lots = self._sized(found, every)
-        return sized, self._unnamed(lots, found, drivers, needed)
+        sized, left = self._sized(found, stack)
+        return sized, self._unnamed(left, found, drivers, needed)
 
-    def _unnamed(
-        self, lots: Sequence[ScoredLot], names: Sequence[Name], drivers: Sequence[str], needed: float
-    ) -> list[Unnamed]:
+    def _unnamed(self, stack: LotStack, names: Sequence[Name], drivers: Sequence[str], needed: float) -> list[Unnamed]:
         """Dependences on pose that differ by a driver, in lots from which the named effects are subtracted."""
         out: list[Unnamed] = []
         least = max([needed, *(_REMAINDER * name.score for name in names)])
         while SHAPE in self.effects and len(out) < _MOST:
-            sums, scores, significant = self._judged(lots, drivers, needed)
+            sums, scores, significant = self._judged(stack, drivers, needed)
             best = max((pair for pair in significant if pair[1] == SHAPE), key=lambda pair: scores[pair], default=None)
             if best is None or scores[best] <= least or best[0] in {unnamed.driver for unnamed in out}:
                 break
-            out.append(self._shape(lots, sums[best[0]]))
+            out.append(self._shape(stack, sums[best[0]]))
             least = max(least, _REMAINDER * scores[best])
-            lots = self._subtracted(lots, *best)
+            stack = self._subtracted(stack, *best)
         return out
 
     def _judged(
-        self, lots: Sequence[ScoredLot], drivers: Sequence[str], needed: float
+        self, stack: LotStack, drivers: Sequence[str], needed: float
     ) -> tuple[dict[str, DriverSums], Scores, list[tuple[str, str]]]:
         """Sums by driver, scores of all pairs of driver and effect, and the pairs that halves of the lots predict, too.
 
         The significance, in standard deviations, with which they predict each other is normalised by the contributions of the
         lots themselves, so that noise larger than stated does not raise it.
         """
-        sums = gathered(lots, drivers)
+        sums = gathered(stack, drivers)
         scores = {(driver, effect): self.score(of, effect) for driver, of in sums.items() for effect in self.effects}
-        crossed = {driver: np.zeros((2, len(self.effects))) for driver in sums}
-        for driver, x in self._crossed(lots, list(sums)):
-            crossed[driver] += x, x**2
         least = np.sqrt(2.0 * needed)
-        significant = [
-            (driver, effect)
-            for driver, (s, v) in crossed.items()
-            for effect, z in zip(self.effects, s / np.sqrt(np.maximum(v, 1e-300)), strict=True)
-            if z > least and scores[driver, effect] > needed
-        ]
+        significant: list[tuple[str, str]] = []
+        for driver, x in self._crossed(stack, list(sums)).items():
+            z = x.sum(axis=0) / np.sqrt(np.maximum((x**2).sum(axis=0), 1e-300))
+            above = (effect for effect, of_effect in zip(self.effects, z, strict=True) if of_effect > least)
+            significant += [(driver, effect) for effect in above if scores[driver, effect] > needed]
         return sums, scores, significant
 
-    def _shape(self, lots: Sequence[ScoredLot], sums: DriverSums) -> Unnamed:
+    def _shape(self, stack: LotStack, sums: DriverSums) -> Unnamed:
         """The dependence on pose of the level with the largest one."""
-        fit = self._fit(lots, sums, SHAPE).solved()
+        fit = self._fit(stack, sums, SHAPE)
         z2 = over(fit.sizes**2, (fit.errors**2).mean(axis=0)).sum(axis=1)
         level = int(np.argmax(z2))
         errors = fit.errors[:, level].reshape(len(fit.errors), self.axes, -1)
@@ -199,17 +192,12 @@ class Pool:
         label = sums.labels[level] if len(sums.labels) > 1 else ""
         return Unnamed(sums.driver, label, fit.sizes[level].reshape(self.axes, -1), covariance)
 
-    def _fit(self, lots: Sequence[ScoredLot], sums: DriverSums, *effects: str, stated: bool = False) -> LevelFit:
-        """The normal equations of effects by a driver, which has the sums over the lots."""
+    def _fit(self, stack: LotStack, sums: DriverSums, *effects: str, stated: bool = False) -> LevelFit:
+        """The sizes of effects by a driver, which has the sums over the lots."""
         here = self.everywhere(*effects)
-        of_means = self.lot[np.ix_(here, here)]
-        among = self._within(*effects), of_means, self._inner(sums, *effects), _inverse(of_means)
-        return LevelFit(lots, sums, here, self.axes, among, stated=stated)
-
-    def _within(self, *effects: str) -> Array:
-        """Correlations (axes·p, axes·p) of the hypotheses of effects within lots."""
-        at = self.places(*effects)
-        return np.asarray(block_diag(*self.inside[:, at[:, None], at]), dtype=np.float64)
+        within, of_means = (products[np.ix_(here, here)] for products in (self.inside, self.lot))
+        among = within, of_means, self._inner(sums, *effects), inverse_of(of_means, _SEEN)
+        return LevelFit(stack, sums, here, self.axes, among, stated=stated)
 
     def _raised(self, pair: tuple[str, str], alarmed: Iterable[tuple[str, str]]) -> bool:
         """Whether an effect or one with similar columns, or any function of the pose, had an alarm by a driver."""
@@ -232,39 +220,34 @@ class Pool:
                 return True
         return False
 
-    def _subtracted(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
+    def _subtracted(self, stack: LotStack, driver: str, effect: str) -> LotStack:
         """The lots with an effect of a driver subtracted, and with what all have of it in common."""
         for by in dict.fromkeys((driver, MEAN)):  # sizes are about the mean of levels, or of numbers
-            lots, _ = self._taken(lots, by, effect)
-        return lots
+            stack, _ = self._taken(stack, by, effect)
+        return stack
 
-    def _taken(self, lots: Sequence[ScoredLot], driver: str, *effects: str) -> tuple[Sequence[ScoredLot], Array]:
+    def _taken(self, stack: LotStack, driver: str, *effects: str) -> tuple[LotStack, Array]:
         """The lots with effects of a driver subtracted, and the sizes (levels, axes·p) that were."""
-        sums = gathered(lots, [driver])[driver]
-        fit = self._fit(lots, sums, *effects, stated=True)
-        taken = fit.solved(draws=0).sizes
-        if fit.levels > 1:  # sizes of levels are shrunk towards zero according to their noise
-            noise, squares = fit.stated_variance.sum(axis=1), (taken**2).sum(axis=1)
-            taken = taken * np.clip(1.0 - noise / np.maximum(squares, 1e-300), 0.0, 1.0)[:, None]
-        return [self.without(lot, sums, taken, *effects) for lot in lots], taken
+        sums = gathered(stack, [driver])[driver]
+        taken = self._fit(stack, sums, *effects, stated=True).shrunk
+        return self._without(stack, sums, taken, *effects), taken
 
-    def _with(self, lots: Sequence[ScoredLot], driver: str, taken: Array, *effects: str) -> Sequence[ScoredLot]:
+    def _with(self, stack: LotStack, driver: str, taken: Array, *effects: str) -> LotStack:
         """The lots with what was subtracted of effects, (levels, axes·p), added again."""
-        sums = gathered(lots, [driver])[driver]
-        return [self.without(lot, sums, -taken, *effects) for lot in lots]
+        return self._without(stack, gathered(stack, [driver])[driver], -taken, *effects)
 
-    def _crossed(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> Iterator[tuple[str, Array]]:
-        """For each lot and driver, the product of the lot's scores and their prediction by the other half, (effects,)."""
-        parts = lots[0::2], lots[1::2]
-        halves = gathered(parts[0], drivers, parts[1]), gathered(parts[1], drivers, parts[0])
-        for number, lot in enumerate(lots):
-            for name, sums in halves[1 - number % 2].items():
-                yield name, self._predicted(lot, sums) @ self._sum_over
+    def _crossed(self, stack: LotStack, drivers: Sequence[str]) -> dict[str, Array]:
+        """For each driver, the products of each lot's scores and their prediction by the other half, (lots, effects)."""
+        out = {driver: np.zeros((len(stack.lots), len(self.effects))) for driver in drivers}
+        halves = [stack.part(slice(first, None, 2)) for first in (0, 1)]
+        for first, (half, other) in enumerate((halves, halves[::-1])):
+            for driver, sums in gathered(other, drivers, half.lots).items():
+                out[driver][first::2] = self._predicted(half, sums) @ self._sum_over
+        return out
 
     def carried(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Array:
         """Contribution (n,) of each lot to the cross-validated evidence of an effect by a driver."""
-        index = self.effects.index(effect)
-        return np.array([x[index] for _, x in self._crossed(lots, [driver])])
+        return self._crossed(LotStack.of(lots), [driver])[driver][:, self.effects.index(effect)]
 
     def confirmed(
         self, before: Sequence[ScoredLot], after: Sequence[ScoredLot], driver: str, effect: str
@@ -273,59 +256,42 @@ class Pool:
 
         The part is one if the effect is confirmed; lots with new levels of the driver are not used.
         """
-        sums = gathered(before, [driver], after).get(driver)
+        sums = gathered(LotStack.of(before), [driver], after).get(driver)
         if sums is None:
             return float("nan"), float("inf"), 0
-        both = np.array([(self._predicted(lot, sums), self._expected(lot, sums)) for lot in after])
-        shown, expected = (both @ self._sum_over)[..., self.effects.index(effect)].T
+        stack, of_effect = LotStack.of(after), self._sum_over[:, self.effects.index(effect)]
+        shown, expected = (part(stack, sums) @ of_effect for part in (self._predicted, self._expected))
         able, total = int(np.count_nonzero(expected > 0.0)), float(expected.sum())
         if not able or total <= 0.0:
             return float("nan"), float("inf"), 0
         factor = float(shown.sum()) / total
         return factor, float(np.sqrt(np.sum((shown - factor * expected) ** 2))) / total, able
 
-    def _predicted(self, lot: ScoredLot, sums: DriverSums) -> Array:
-        """Product (h,) of a lot's scores and the sizes that other lots predict, summed over its units."""
-        return ((lot.inside[0] if sums.inside_only else lot.score) * sums.predicted_sizes(lot)).sum(axis=0)
+    def _predicted(self, stack: LotStack, sums: DriverSums) -> Array:
+        """Product (lots, h) of the lots' scores and the sizes that other lots predict, summed over the units."""
+        return stack.by_lot @ ((stack.left if sums.inside_only else stack.score) * sums.predicted_sizes(stack))
 
-    def _expected(self, lot: ScoredLot, sums: DriverSums) -> Array:
-        """Expected value of :meth:`_predicted` if the prediction is true, (h,)."""
-        of_units = sums.predicted_sizes(lot)
-        common = lot.averaged(of_units)
-        inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
-        return inside if sums.inside_only else inside + common**2 * lot.information
+    def _expected(self, stack: LotStack, sums: DriverSums) -> Array:
+        """Expected value of :meth:`_predicted` if the prediction is true, (lots, h)."""
+        about, common = stack.about_lots(sums.predicted_sizes(stack))
+        inside = stack.by_lot @ (about**2 * stack.own)
+        return inside if sums.inside_only else inside + common**2 * stack.information
 
-    def without(self, lot: ScoredLot, sums: DriverSums, sizes: Array, *effects: str) -> ScoredLot:
-        """A lot with effects of sizes (levels, axes·p) subtracted from its sums; no dwell is read again."""
-        at, count, weights = self.places(*effects), len(self.columns), sums.weights(lot)
-        if not weights.any():
-            return lot
-        score, sizes = lot.score.copy(), sizes.reshape(len(sizes), self.axes, -1)
-        root, everywhere = np.sqrt(np.maximum(lot.information, 0.0)), self.everywhere(*effects)
-        in_common: list[Array] = []
-        for axis in range(self.axes):
-            here, every = axis * count + at, axis * count + np.arange(count)
-            of_units = weights @ sizes[:, axis]  # (units, p)
-            unit_roots = np.sqrt(np.maximum(lot.own[:, every], 0.0))
-            total = np.maximum(lot.own[:, here].sum(axis=0), 1e-300)
-            in_common.append((of_units * lot.own[:, here]).sum(axis=0) / total)
-            score[:, every] -= unit_roots * (((of_units - in_common[-1]) * unit_roots[:, at]) @ self.inside[axis][at])
+    def _without(self, stack: LotStack, sums: DriverSums, sizes: Array, *effects: str) -> LotStack:
+        """The lots with effects of sizes (levels, axes·p) subtracted from their sums; no dwell is read again."""
+        here = self.everywhere(*effects)
+        moved = stack.about_lots(sums.weights(stack) @ sizes, here)
         # the free errors of the station couple the axes
-        score -= lot.own / lot.total * root * ((np.concatenate(in_common) * root[everywhere]) @ self.lot[everywhere])
-        return replace(lot, score=score)
+        inside, of_lots = stack.predicted(moved, self.inside[here], self.lot[here], here)
+        return stack.with_score(stack.score - inside - stack.share * of_lots[stack.lot])
 
     def with_effect(self, lot: ScoredLot, effect: str) -> ScoredLot:
         """A lot with an effect added to its model, with coefficients of every unit and axis: U_j − I_jk U_k / I_kk."""
-        at, count = self.places(effect), len(self.columns)
-        sums, share = lot.score.sum(axis=0), lot.own / lot.total
-        left, by_unit, information = lot.inside[0].copy(), lot.own.copy(), lot.information.copy()
-        for axis in range(self.axes):
-            every = axis * count + np.arange(count)
-            left[:, every], by_unit[:, every] = _eliminated(left[:, every], by_unit[:, every], self.inside[axis], at)
-        of_sums = _eliminated(sums[None], information[None], self.lot, self.everywhere(effect))
-        sums, information = (part[0] for part in of_sums)
-        score = np.where(by_unit > 0.0, left + share * sums, 0.0)
-        return replace(lot, score=score, own=by_unit, information=information)
+        here, sums = self.everywhere(effect), lot.score.sum(axis=0)
+        left, own = _eliminated(lot.inside[0], lot.own, self.inside, here)
+        (sums,), (information,) = _eliminated(sums[None], lot.information[None], self.lot, here)
+        score = np.where(own > 0.0, left + lot.own / lot.total * sums, 0.0)
+        return replace(lot, score=score, own=own, information=information)
 
     def places(self, *effects: str) -> Places:
         """Indices of the columns of effects, (p,)."""
@@ -342,7 +308,7 @@ class Pool:
         effect would seem to explain three times the actual chi-square.
         """
         here = self.everywhere(*effects)
-        return _inverse(self._within(*effects) if sums.mixed else self.lot[np.ix_(here, here)])
+        return inverse_of((self.inside if sums.mixed else self.lot)[np.ix_(here, here)], _SEEN)
 
     def score(self, sums: DriverSums, effect: str) -> float:
         """Score of an effect for a driver: the reduction of chi-square by its columns less the price of their coefficients."""
@@ -350,8 +316,8 @@ class Pool:
         info = sums.information[:, here]
         z = over(sums.centred[:, here], np.sqrt(np.maximum(info, 0.0)))
         drop, rank = float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect), z)), (info > 0.0).sum(axis=0)
-        k = float(np.sum(rank) - (np.count_nonzero(rank) if len(sums.place) > 1 else 0))
-        return max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
+        k = float(np.sum(rank) - (np.count_nonzero(rank) if len(sums.labels) > 1 else 0))
+        return drop - price(drop, k)
 
     def _name(self, driver: str, effect: str, scores: Scores) -> Name:
         """An effect of a driver with those that are equivalent, without its sizes."""
@@ -371,7 +337,7 @@ class Pool:
         drivers.sort(key=lambda other: (other != driver, -scores[other, effect]))
         return Name(tuple(effects), tuple(drivers), top)
 
-    def _sized(self, names: Sequence[Name], lots: Sequence[ScoredLot]) -> tuple[list[Name], Sequence[ScoredLot]]:
+    def _sized(self, names: Sequence[Name], stack: LotStack) -> tuple[list[Name], LotStack]:
         """Names with their sizes, fitted together, and what they leave of the lots."""
         groups: dict[str, list[str]] = {}
         for name in names:
@@ -381,26 +347,26 @@ class Pool:
         for _ in range(_ROUNDS if len(names) > 1 else 1):
             for driver, effects in groups.items():
                 if driver in taken:
-                    lots = self._with(lots, driver, taken[driver], *effects)
-                lots, taken[driver] = self._taken(lots, driver, *effects)
+                    stack = self._with(stack, driver, taken[driver], *effects)
+                stack, taken[driver] = self._taken(stack, driver, *effects)
         out: dict[tuple[str, str], Name] = {}
         for driver, effects in groups.items():
             of_driver = [name for name in names if name.drivers[0] == driver]
             if of_driver:
-                alone = self._with(lots, driver, taken[driver], *effects)
+                alone = self._with(stack, driver, taken[driver], *effects)
                 sums = gathered(alone, [driver])[driver]
-                fit = self._fit(alone, sums, *effects).solved()
+                fit = self._fit(alone, sums, *effects)
                 out |= {(driver, name.effects[0]): self._of_fit(name, sums, fit, effects) for name in of_driver}
-        return [out[name.drivers[0], name.effects[0]] for name in names], lots
+        return [out[name.drivers[0], name.effects[0]] for name in names], stack
 
-    def _of_fit(self, name: Name, sums: DriverSums, fit: LevelSizes, effects: Sequence[str]) -> Name:
+    def _of_fit(self, name: Name, sums: DriverSums, fit: LevelFit, effects: Sequence[str]) -> Name:
         """A name with its sizes: rms over the dwells of all its columns by level and axis; of a number, over the units, too.
 
         The sign is that of the column with the largest sum of squares; an error is infinite where no lot shows the axis.
         """
         here = self.everywhere(*effects)
         unit = sums.spread * self.size[here] * np.isin(here, self.everywhere(name.effects[0]))
-        among, count = self._within(*effects), unit.size // self.axes
+        among, count = self.inside[np.ix_(here, here)], unit.size // self.axes
         of_axes = [unit * np.repeat(np.eye(self.axes)[axis], count) for axis in range(self.axes)]
         parts = [np.outer(part, part) * among for part in of_axes]
         squares = np.stack([np.einsum("gp,pq,gq->g", fit.sizes, part, fit.sizes) for part in parts], axis=1)
@@ -412,16 +378,12 @@ class Pool:
         return replace(
             name,
             labels=tuple(sums.labels),
-            weights=np.array(list(sums.units.values()), dtype=np.float64),
+            weights=sums.units,
             sizes=np.copysign(np.sqrt(np.maximum(squares, 0.0)), largest),
             errors=np.where(errors > 0.0, errors, np.inf),
+            by_axis=np.sqrt(np.maximum([fit.mean_square(part)[0] for part in parts], 0.0)),
             square=(mean / self.axes, deviation / self.axes),
         )
-
-
-def _inverse(products: Array) -> Array:
-    """Pseudo-inverse of correlations, without combinations that are not seen."""
-    return np.linalg.pinv(products, rcond=_SEEN, hermitian=True).astype(np.float64)
 
 
 def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float) -> set[int]:
@@ -444,7 +406,7 @@ def _imitations(names: Sequence[Name], of_pose: Sequence[Scores], needed: float)
 
 def _eliminated(values: Array, information: Array, products: Array, at: Places) -> tuple[Array, Array]:
     """Scores and information (n, h) after elimination of the columns ``at``, by correlations (h, h)."""
-    inner = np.linalg.pinv(products[np.ix_(at, at)], rcond=1e-6, hermitian=True)
+    inner = inverse_of(products[np.ix_(at, at)], 1e-6)
     root = np.sqrt(np.maximum(information, 0.0))
     values = values - root * (over(values, root)[:, at] @ inner @ products[at])
     covered = np.einsum("jp,pq,qj->j", products[:, at], inner, products[at])

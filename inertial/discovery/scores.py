@@ -35,7 +35,7 @@ LEAST_LEFT = 0.05
 TEMPCO = "bias_temperature"
 """The effect whose coefficient multiplies an error of the thermometer."""
 
-_RIDGE = 1e-9
+_COLLINEAR = 1e-9  # share of its information below which a combination of columns of the station is left out
 
 
 @dataclass(frozen=True)
@@ -107,6 +107,13 @@ def correlations_of(products: Array) -> Array:
     """Products (..., k, k) normalised to a unit diagonal; zero where the diagonal is zero."""
     root = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 0.0))
     return over(products, root[..., :, None] * root[..., None, :])
+
+
+def inverse_of(information: Array, least: float) -> Array:
+    """Pseudo-inverse of an information (q, q), scaled to a unit diagonal: combinations below the share ``least`` are left out."""
+    root = np.sqrt(np.maximum(np.diagonal(information), 0.0))
+    inner = np.linalg.pinv(correlations_of(information), rcond=least, hermitian=True)
+    return over(np.asarray(inner, dtype=np.float64), np.outer(root, root))
 
 
 def scores_of(
@@ -188,7 +195,7 @@ def _scored(
     cross = of_sensor @ np.swapaxes(of_station, -1, -2)
     station_score = score[:, k:].sum(axis=0)
     between = np.tensordot(of_station, of_station, ((0, 2), (0, 2)))
-    inverse = _inverse(between)
+    inverse = inverse_of(between, _COLLINEAR)
     free = score[:, :k] - cross @ (inverse @ station_score)
     summed = cross.reshape(units, m, k, len(station)).sum(axis=0)  # (m, k, q), over the units
     lots = np.stack([np.tensordot(of_sensor[a::m], of_sensor[a::m], ((0, 2), (0, 2))) for a in range(m)])
@@ -217,10 +224,3 @@ def _tempco(model: Model) -> Array:
     shared = model.shared @ space.shared_sizes if model.shared.shape[-1] else np.zeros_like(problem.y)
     white = space.whiten(np.concatenate([model.local, (problem.y - shared)[..., None]], axis=-1))
     return np.array([np.linalg.lstsq(block[:, :-1], block[:, -1], rcond=None)[0][column] for block in white])
-
-
-def _inverse(information: Array) -> Array:
-    """Pseudo-inverse of the station's information (q, q), scaled to a unit diagonal: columns of a station may be collinear."""
-    scale = np.sqrt(np.maximum(np.diagonal(information), 1e-300))
-    inner = np.linalg.pinv(information / np.outer(scale, scale), rcond=_RIDGE, hermitian=True)
-    return np.where(np.outer(scale, scale) > 1e-290, inner / np.outer(scale, scale), 0.0)

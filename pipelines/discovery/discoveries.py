@@ -9,9 +9,9 @@ import numpy as np
 from inertial.arrays import Array, Places, over
 from inertial.counts import number_of
 from inertial.decisions import CLASS_WIDTH
-from inertial.discovery.driver_sums import DriverSums, gathered
+from inertial.discovery.driver_sums import DriverSums, LotStack, gathered
 from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE, SLOT, STATION, UNIT, ScoredLot
-from inertial.discovery.level_fit import WIDE, LevelFit, LevelSizes
+from inertial.discovery.level_fit import WIDE, LevelFit
 from inertial.discovery.naming import Name, Unnamed
 from inertial.discovery.pose_shape import SHAPE, map_of
 from inertial.discovery.running_sums import growth_of
@@ -126,9 +126,14 @@ class Discoveries:
         return [sensor for sensor, _ in self._both]
 
     @cached_property
-    def _station_sums(self) -> DriverSums:
-        """Sums of the station's columns by station; those of the evidence are bounded."""
-        return gathered([station for _, station in self._both], [STATION])[STATION]
+    def _of_stations(self) -> LotStack:
+        """The same lots with the sums of the station's columns."""
+        return LotStack.of([station for _, station in self._both])
+
+    @cached_property
+    def _station_sums(self) -> dict[str, DriverSums]:
+        """Sums of the station's columns, common and by station; those of the evidence are bounded."""
+        return gathered(self._of_stations, [MEAN, STATION])
 
     def _spread(self, most: int) -> Places:
         count = len(self.state.order)
@@ -187,7 +192,7 @@ class Discoveries:
 
     def _named_row(self, found: Discovery) -> DiscoveryRow:
         name, state, pool = found.name, self.state, self.source.pool
-        effect, sizes = name.effects[0], name.by_axis()
+        effect, sizes = name.effects[0], name.by_axis
         of_thermometer = {state.effect_of(alarm) for alarm in self._of_thermometer} & set(name.effects)
         scope = ("thermometer", _PROPORTIONAL) if of_thermometer else self._scope(found)
         here = [*pool.everywhere(effect), state.sensor.count + pool.effects.index(effect)]
@@ -212,13 +217,17 @@ class Discoveries:
         effect, column, _ = self.state.hypotheses[alarm.index]
         at = alarm.index - self.state.sensor.size
         here = [k for k, (name, _) in enumerate(self.state.of_station) if name == effect]
-        unit, largest = self._sizes_of_station(here), here.index(at)
-        of_stations, fit = (self._station_fit(driver, here) for driver in (STATION, alarm.driver))
-        square, deviation = fit.mean_square(np.diag(unit**2))
+        unit, largest, alone = self._sizes_of_station(here), here.index(at), np.eye(len(here))
+        fits = {
+            by: LevelFit(self._of_stations, sums, np.array(here), 1, (alone, alone, alone, alone))
+            for by, sums in self._station_sums.items()
+        }
+        square, deviation = fits[_of_reference(alarm.driver)].mean_square(np.diag(unit**2))
         size, low, high = np.sqrt(np.maximum(square + WIDE * deviation * np.array([0.0, -1.0, 1.0]), 0.0)).tolist()
-        common, *_ = self._station_levels(alarm.driver, here)
-        sizes = (unit * (common + of_stations.sizes))[:, largest]
-        errors = unit[largest] * np.sqrt(np.mean(of_stations.errors[..., largest] ** 2, axis=0))
+        common, by_station = self._station_sums[MEAN], self._station_sums[STATION]
+        of_mean = over(common.score, common.information)[:, here] * (len(by_station.labels) > 1)
+        sizes = (unit * (of_mean + fits[STATION].sizes))[:, largest]
+        errors = unit[largest] * np.sqrt(np.mean(fits[STATION].errors[..., largest] ** 2, axis=0))
         drops = sorted(
             (self._explained(a), self.state.effect_of(a)) for a in self._of_station if a.driver == alarm.driver
         )
@@ -228,29 +237,15 @@ class Discoveries:
         row["kind"] = "slope" if alarm.driver == DATE else row["kind"]
         row["levels"] = [
             {"level": label, "axis": "", "size_ug": MICRO * value, "u_ug": MICRO * error, "units": 0}
-            for label, value, error in zip(self._station_sums.labels, sizes.tolist(), errors.tolist(), strict=True)
+            for label, value, error in zip(by_station.labels, sizes.tolist(), errors.tolist(), strict=True)
         ]
         row["next"] = "check the station's references (level, encoders, fixture), see 'tumbleline audit'"
         return row
 
-    def _station_fit(self, driver: str, columns: Sequence[int]) -> LevelSizes:
-        """Sizes of columns of the station, common to all lots, or by station about their mean."""
-        lots, by = [station for _, station in self._both], MEAN if driver == MEAN else STATION
-        alone = np.eye(len(columns))
-        return LevelFit(lots, gathered(lots, [by])[by], np.array(columns), 1, (alone, alone, alone, alone)).solved()
-
-    def _station_levels(self, driver: str, columns: Sequence[int]) -> tuple[Array, Array, Array]:
-        """Coefficients of columns of the station: common (p,), of each station about it, and standard errors (stations, p)."""
-        sums = self._station_sums
-        score, information = sums.score[:, columns], np.maximum(sums.information[:, columns], 1e-300)
-        several = driver == MEAN or len(score) > 1
-        common = score.sum(axis=0) / information.sum(axis=0) * several
-        return common, score / information - common, 1.0 / np.sqrt(information)
-
     def _explained(self, alarm: Alarm) -> float:
         """Reduction of the chi-square of all lots by a column of the station, common to all stations or about their mean."""
-        common, about, errors = self._station_levels(alarm.driver, [alarm.index - self.state.sensor.size])
-        return float(np.sum(((common if alarm.driver == MEAN else about) / errors) ** 2))
+        sums, at = self._station_sums[_of_reference(alarm.driver)], alarm.index - self.state.sensor.size
+        return float(over(sums.centred[:, at] ** 2, sums.information[:, at]).sum())
 
     def _sizes_of_station(self, columns: Sequence[int]) -> Array:
         """Rms over the dwells, g, of columns (p,) of the station with coefficient one, of what the model of a lot leaves of them.
@@ -258,11 +253,9 @@ class Discoveries:
         Their information per unit and axis, beside that of functions of the pose, whose size is known.
         """
         here = self.source.pool.everywhere(SHAPE)
-        both = [
-            (sensor.own[:, here].mean(axis=0), station.information[columns] / (AXES * len(sensor.units)))
-            for sensor, station in self._both
-        ]
-        own, of_station = (np.mean(np.array(part), axis=0) for part in zip(*both, strict=True))
+        own = np.mean([sensor.own[:, here].mean(axis=0) for sensor in self._lots], axis=0)
+        units = np.array([[len(sensor.units)] for sensor in self._lots])
+        of_station = np.mean(self._of_stations.information[:, columns] / (AXES * units), axis=0)
         return np.sqrt(of_station / np.median(over(own, self.source.pool.size[here] ** 2)))
 
     def _thermometer_row(self) -> DiscoveryRow:
@@ -346,9 +339,14 @@ def plain(driver: str) -> str:
     return driver.removesuffix(INSIDE)
 
 
+def _of_reference(driver: str) -> str:
+    """The driver by which the sizes of an error of the references are told: of a date, the station."""
+    return MEAN if driver == MEAN else STATION
+
+
 def _levels_of(name: Name) -> list[DiscoveredLevel]:
     """The levels on the axis with the largest differences, in order of size."""
-    axis = int(np.argmax(name.by_axis()))
+    axis = int(np.argmax(name.by_axis))
     order = np.argsort(-np.abs(name.sizes[:, axis]))[:_SHOWN_LEVELS]
     return [
         {

@@ -9,7 +9,7 @@ import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ from schemas.errors import ArchiveUnusable
 from schemas.units import MICRO
 
 FOLDER = "discovery"
-VERSION = 5
+VERSION = 6
 AXES = 3
 MOST_OPEN = 32  # files whose rows are kept in memory: units measured repeatedly were often measured together
 BATCH = 8  # runs that one process scores at a time
@@ -49,7 +49,7 @@ class ScoreStore:
     def __init__(self, archive: Archive) -> None:
         self.archive = archive
         self.folder: Place = archive.root / FOLDER / "scores"
-        self._opened: dict[Place, pa.Table] = {}
+        self._opened = lru_cache(MOST_OPEN)(_rows_of)
 
     @cached_property
     def _all(self) -> tuple[dict[str, dict[str, Any]], dict[str, Products]]:
@@ -82,15 +82,8 @@ class ScoreStore:
 
     def run(self, run: str) -> ScoredRun:
         """The scores of a run."""
-        path = self.heads[run]["file"]
-        if path not in self._opened:
-            read = content_of(derived.unframed(path)[0])
-            if read is None:
-                raise ArchiveUnusable(f"{path}: the scores were changed while they were read; run it again")
-            while len(self._opened) >= MOST_OPEN:
-                self._opened.pop(next(iter(self._opened)))
-            self._opened[path] = read[0]
-        return run_of(self._opened[path].slice(self.heads[run]["row"], 1).to_pylist()[0], self._all[1])
+        head = self.heads[run]
+        return run_of(self._opened(head["file"]).slice(head["row"], 1).to_pylist()[0], self._all[1])
 
     def add(self, ids: Sequence[str], workers: int, distribute: Distributor | None = None) -> int:
         """Score runs without scores, in parallel processes; returns the number of newly scored runs."""
@@ -104,7 +97,7 @@ class ScoreStore:
             return 0
         number = 1 + max((int(path.name.split(".")[0]) for path in self._paths()), default=0)
         files.publish(self.folder / f"{number:06d}.scores", derived.framed(written(scored)))
-        self._opened.clear()
+        self._opened.cache_clear()
         self.__dict__.pop("_all", None)
         return len(scored)
 
@@ -150,9 +143,17 @@ def content_of(data: bytes) -> tuple[pa.Table, dict[str, Products]] | None:
         for name, (sensor, station, lots) in about["columns"].items():
             if name:
                 columns, of_station = (tuple((str(e), int(k)) for e, k in listed) for listed in (sensor, station))
-                parts = {key: arrays[f"{name}/{key}"] for key in ("size", "within", "across", "inside")}
+                parts = {key: arrays[f"{name}/{key}"] for key in ("size", "lot", "inside")}
                 products[name] = Products(columns, of_station, *_unfolded(parts, len(columns)), lots=int(lots))
     return table, products
+
+
+def _rows_of(path: Place) -> pa.Table:
+    """The rows of a file of scores that was sound before."""
+    read = content_of(derived.unframed(path)[0])
+    if read is None:
+        raise ArchiveUnusable(f"{path}: the scores were changed while they were read; run it again")
+    return read[0]
 
 
 def run_of(row: Mapping[str, Any], products: Mapping[str, Products]) -> ScoredRun:
@@ -200,33 +201,28 @@ def _unpacked(row: Mapping[str, Any], products: Products) -> LotScores:
     )
 
 
+def _steps(k: int) -> Array:
+    """Steps per unit correlation of columns, (3·k, 3·k)."""
+    return np.where(np.kron(np.eye(AXES), np.ones((k, k))) > 0.0, _WITHIN, _ACROSS)
+
+
 def _folded(products: Products) -> dict[str, NDArray[Any]]:
-    """Correlations of columns on one axis and on two, for sums over units, and within lots; and the sizes."""
+    """Upper triangles of the correlations of columns, for sums over units, and within lots; and the sizes."""
     k = len(products.columns)
-    upper, lot = np.triu_indices(k), correlations_of(products.lot).reshape(AXES, k, AXES, k)
-    within = np.stack([lot[axis, :, axis] for axis in range(AXES)])
-    across = np.stack([lot[axis, :, axis - 1] for axis in range(AXES)])
-    parts = {
-        "within": _WITHIN * within[:, *upper],
-        "across": _ACROSS * across,
-        "inside": _WITHIN * correlations_of(products.inside)[:, *upper],
-    }
-    size = {"size": products.size.astype(np.float32)}
-    return size | {name: np.frombuffer(_planes(steps), dtype=np.uint8) for name, steps in parts.items()}
+    lot, inside = _steps(k) * correlations_of(products.lot), _WITHIN * correlations_of(products.inside)
+    upper = {"lot": lot[np.triu_indices(len(lot))], "inside": inside[:, *np.triu_indices(k)]}
+    packed = {name: np.frombuffer(_planes(values), dtype=np.uint8) for name, values in upper.items()}
+    return packed | {"size": products.size.astype(np.float32)}
 
 
 def _unfolded(parts: Mapping[str, NDArray[Any]], k: int) -> tuple[Array, Array, Array]:
     """Correlations (3·k, 3·k) and (3, k, k) and sizes (3·k,), of :func:`_folded`."""
-    upper, lot = np.triu_indices(k), np.zeros((AXES, k, AXES, k))
-    inside, within = np.zeros((2, AXES, k, k))
-    for kind, square in (("inside", inside), ("within", within)):
-        square[:, *upper] = _of_planes(parts[kind].tobytes()).reshape(AXES, -1) / _WITHIN
+    lot, inside = np.zeros((1, AXES * k, AXES * k)), np.zeros((AXES, k, k))
+    for name, square in (("lot", lot), ("inside", inside)):
+        upper = np.triu_indices(square.shape[-1])
+        square[:, *upper] = _of_planes(parts[name].tobytes()).reshape(len(square), -1)
         square[:, *upper[::-1]] = square[:, *upper]
-    across = _of_planes(parts["across"].tobytes()).reshape(AXES, k, k) / _ACROSS
-    for axis in range(AXES):
-        lot[axis, :, axis] = within[axis]
-        lot[axis, :, axis - 1], lot[axis - 1, :, axis] = across[axis], across[axis].T
-    return lot.reshape(AXES * k, AXES * k), inside, parts["size"].astype(np.float64)
+    return lot[0] / _steps(k), inside / _WITHIN, parts["size"].astype(np.float64)
 
 
 def _planes(values: Array) -> bytes:

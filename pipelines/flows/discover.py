@@ -12,7 +12,7 @@ from pipelines.archive.files import ELSEWHERE, json_bytes, publish
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.documents import DiscoverDocument
 from pipelines.discovery.page import render
-from pipelines.discovery.sentences import headline, scope_text, unexplained_text
+from pipelines.discovery.sentences import texts_of
 from pipelines.orchestrator.archive_address import archive_of
 from pipelines.tables.json_values import json_value
 
@@ -39,8 +39,7 @@ def discover_in_archive(archive: str | None = None, device: str = "", pages: str
     pages : folder for the page and the document of every night
     """
     document = look(archive, device, Path(pages), workers)
-    rows = [f"- {headline(row)}. {scope_text(row)}" for row in document["discoveries"]]
-    rows += [f"- {unexplained_text(row)}" for row in document["unexplained"]]
+    rows = [f"- {'. '.join(texts_of(row)[:2])}" for row in (*document["discoveries"], *document["unexplained"])]
     title = f"# {number_of(len(rows), 'discovery', 'discoveries')} in {number_of(document['pooled']['lots'], 'lot')}"
     create_markdown_artifact(key=KEY, markdown="\n".join([title, "", *(rows or ["Nothing is beyond chance."])]))
     return len(document["new"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from long_suites import mostly_slow
 
-from inertial.discovery.driver_sums import gathered
+from inertial.discovery.driver_sums import LotStack, gathered
 from inertial.discovery.evidence import MEAN, ScoredLot
 from inertial.discovery.naming import Name, Pool
 from inertial.discovery.scores import Products
@@ -47,7 +47,7 @@ def pool() -> Pool:
 
 
 def named(lots: list[ScoredLot], driver: str) -> Name:
-    (name,), _ = pool()._sized([Name(("third_order",), (driver,), 100.0)], lots)
+    (name,), _ = pool()._sized([Name(("third_order",), (driver,), 100.0)], LotStack.of(lots))
     return name
 
 
@@ -115,4 +115,4 @@ def test_the_evidence_of_an_effect_without_levels_is_that_of_its_lots() -> None:
     name = named(lots, MEAN)
     assert name.sizes[0] == pytest.approx([0.5] * AXES, abs=4.0 / np.sqrt(90 * UNITS))
     assert name.errors[0] == pytest.approx([1.0 / np.sqrt(90 * UNITS)] * AXES, rel=0.5)
-    assert gathered(lots, [MEAN])[MEAN].labels == list(name.labels)
+    assert gathered(LotStack.of(lots), [MEAN])[MEAN].labels == list(name.labels)

@@ -9,7 +9,7 @@ from long_suites import mostly_slow
 
 from benchmarks.discovery.archives import ArchiveMaker, Hidden, Result, Setting
 from benchmarks.discovery.lots import FLOOR_UG, WORLDS, bank
-from inertial.discovery.driver_sums import gathered
+from inertial.discovery.driver_sums import LotStack, gathered
 from inertial.discovery.evidence import ScoredLot
 from inertial.discovery.naming import Pool
 
@@ -107,7 +107,7 @@ def test_two_levels_have_the_size_about_their_mean_and_leave_nothing() -> None:
     assert np.all(np.abs(np.abs(name.sizes[0]) - np.abs(true)) < 3.0 * name.errors[0])
     lots = supplied(archive("cross_coupling", "slot"))
     (name, *_), _ = pool().names(lots, {("supplier", "cross_coupling")}, NEEDED)
-    left = pool()._subtracted(lots, "supplier", "cross_coupling")
+    left = pool()._subtracted(LotStack.of(lots), "supplier", "cross_coupling")
     assert pool().score(gathered(left, ["supplier"])["supplier"], "cross_coupling") < 0.01 * name.score
 
 

@@ -93,21 +93,34 @@ def test_the_same_dwells_in_another_run_count_once(tmp_path: Path) -> None:
     assert source.left_out() == [(run, f"its dwells are those of {first}, which counts") for run in others]
 
 
-def test_the_size_of_an_error_of_a_station_is_what_the_models_of_its_lots_leave(tmp_path: Path) -> None:
-    archive, line = Archive(str(tmp_path / "archive")), Line(5, units=2)
+def leaning_line(folder: Path, lots: int, stations: int) -> tuple[list[Any], float]:
+    """Discoveries of a level error in a line whose first station leans, and the rms in µg that the model leaves of it."""
+    archive, line = Archive(str(folder / "archive")), Line(5, units=2)
     archive.prepare()
     dwells, leaning = pd.DataFrame(), np.zeros((0, 3))
-    for number in range(66):
-        dwells, about = line.lot(STATIONS[number % 3])
+    for number in range(lots):
+        dwells, about = line.lot(STATIONS[number % stations])
         leaning = to_fixture((200e-6, 0.0, 0.0), *np.radians(dwells[["outer_deg", "inner_deg"]].to_numpy().T))
-        dwells[["out_x", "out_y", "out_z"]] += leaning * (number % 3 == 0)
-        write_run(archive, number, STATIONS[number % 3], dwells, about)
+        dwells[["out_x", "out_y", "out_z"]] += leaning * (number % stations == 0)
+        write_run(archive, number, STATIONS[number % stations], dwells, about)
     columns = np.column_stack([np.ones(len(dwells)), dwells[["force_x", "force_y", "force_z"]]])
     left = 1e6 * (leaning - columns @ np.linalg.lstsq(columns, leaning, rcond=None)[0])
     rows = discovered(archive, Look()).document["discoveries"]
-    (row,) = (row for row in rows if "level_error" in row["effects"] and row["driver"] == "station")
+    return [row for row in rows if "level_error" in row["effects"]], float(np.sqrt(np.mean(left**2)))
+
+
+def test_the_size_of_an_error_of_a_station_is_what_the_models_of_its_lots_leave(tmp_path: Path) -> None:
+    rows, left = leaning_line(tmp_path, 66, 3)
+    (row,) = (row for row in rows if row["driver"] == "station")
     # about the mean of three stations, of which one leans
-    assert row["size_ug"] == pytest.approx(np.sqrt(np.mean(left**2) * 2.0 / 9.0), rel=0.15)
+    assert row["size_ug"] == pytest.approx(np.sqrt(2.0 / 9.0) * left, rel=0.15)
+
+
+def test_the_only_station_has_the_size_that_its_lots_have_in_common(tmp_path: Path) -> None:
+    ((row,), left) = leaning_line(tmp_path, 40, 1)
+    (level,) = row["levels"]
+    assert row["driver"] == "mean"
+    assert (row["size_ug"], level["size_ug"]) == pytest.approx((left, left), rel=0.15)
 
 
 def test_sums_that_are_lost_are_made_again_with_what_was_known_in_each_night(tmp_path: Path) -> None:
