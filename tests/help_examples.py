@@ -90,8 +90,10 @@ def recordings(folder: Path) -> None:
     """Recordings, dwells and keys."""
     rng = np.random.default_rng(1)
     table = pd.read_parquet(next((folder / "archive" / "runs").glob("*/dwells.parquet")))
-    for name in ("dwells", "fresh"):
-        table.to_csv(folder / f"{name}.csv", index=False)
+    table.to_csv(folder / "dwells.csv", index=False)
+    for axis in "xyz":  # measured once more
+        table[f"out_{axis}"] += 1e-4 * rng.normal(size=len(table))
+    table.to_csv(folder / "fresh.csv", index=False)
     turned = _turned()
     time = 0.01 * np.arange(len(turned))
     counts = np.round(256000.0 * (turned * 1.002 + 0.01) + 25.0 * rng.normal(size=turned.shape))

@@ -236,7 +236,7 @@ class Discoveries:
         row = self._row(alarm, [*effects], [alarm.driver], (size, low, high), ("station", because), self._log_e(alarm))
         row["kind"] = "slope" if alarm.driver == DATE else row["kind"]
         row["levels"] = [
-            {"level": label, "axis": "", "size_ug": MICRO * value, "u_ug": MICRO * error, "units": 0}
+            {"level": label, "size_ug": MICRO * value, "u_ug": MICRO * error, "units": 0, "axis": ""}
             for label, value, error in zip(by_station.labels, sizes.tolist(), errors.tolist(), strict=True)
         ]
         row["next"] = "check the station's references (level, encoders, fixture), see 'tumbleline audit'"
@@ -351,10 +351,10 @@ def _levels_of(name: Name) -> list[DiscoveredLevel]:
     return [
         {
             "level": name.labels[at],
-            "axis": "xyz"[axis],
             "size_ug": MICRO * float(name.sizes[at, axis]),
             "u_ug": MICRO * float(name.errors[at, axis]),
             "units": int(name.weights[at]),
+            "axis": "xyz"[axis],
         }
         for at in order
         if np.isfinite(name.errors[at, axis])

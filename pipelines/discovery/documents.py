@@ -39,10 +39,10 @@ class DiscoveredLevel(TypedDict):
     """One level of a driver."""
 
     level: str
-    axis: Annotated[str, "the axis with the largest differences; empty: of the force on all axes"]
-    size_ug: Annotated[float, "signed, on this axis"]
+    size_ug: Annotated[float, "signed, on the axis"]
     u_ug: Annotated[float, "one standard error"]
     units: int
+    axis: Annotated[str, "the axis with the largest differences; empty: of the force on all axes"]
 
 
 class CarriedBy(TypedDict):

@@ -278,9 +278,15 @@ def test_an_installed_package_takes_part(monkeypatch: pytest.MonkeyPatch, tmp_pa
 @pytest.mark.usefixtures("no_next_measurement")
 def test_a_run_brings_its_history_and_its_own_model_unless_another_is_named(tmp_path: Path) -> None:
     plain = '"misalignment"]'
-    run = small_run(tmp_path, None, *AT_ROOM, (plain, plain.replace("]", ', "second_order"]')))
+    run, again = (
+        small_run(tmp_path, None, *AT_ROOM, (plain, plain.replace("]", ', "second_order"]'))),
+        tmp_path / "fresh.csv",
+    )
     own, where = run.about["recipe"]["effects"], ("--archive", run.archive.root)
-    compared = document_of("compare", "latest", "--fresh", run.id, *where)
+    table, rng = pd.read_parquet(next(run.archive.root.glob("runs/*/dwells.parquet"))), np.random.default_rng(1)
+    table[["out_x", "out_y", "out_z"]] += 1e-6 * rng.standard_normal((len(table), 3))  # measured once more
+    table.to_csv(again, index=False)
+    compared = document_of("compare", "latest", "--fresh", again, *where)
     assert compared["fresh_rms_ug"] == pytest.approx(compared["rms_ug"], rel=0.01)
     judged = document_of("diagnose", run.id, *where)
     assert judged["effects"] == compared["effects"] == own

@@ -116,7 +116,7 @@ def test_a_doubt_and_too_few_positions_are_refused_with_what_to_add(rng: np.rand
     columns = ["unit", "dwell", "time_s", "out_x", "out_y", "out_z"]
     tables = pd.DataFrame([["A", 0, 0.0, 0.0, 0.0, 1.0]], columns=columns)
     for name in ("d1.csv", "d2.csv"):
-        tables.to_csv(name, index=False)
+        tables.assign(unit=name).to_csv(name, index=False)
     assert "2 tables of dwells, one is needed" in refused("improve", "d1.csv", "d2.csv")
     assert not Path("archive").exists()
 

@@ -48,6 +48,7 @@ OTHERWISE = {
     # the recipe of the folder is measured to its end
     "tumbleline plan order my.toml": "no table [stop]",
     "tumbleline plan order my.toml --output my-first.toml": "no table [stop]",
+    "tumbleline station monitor --queue line-1": "PREFECT_API_URL is not set",
     # the lot of the folder was measured at one temperature
     "tumbleline fit latest --limits industrial": "needs effect bias_temperature",
 }
