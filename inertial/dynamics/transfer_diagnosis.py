@@ -1,7 +1,7 @@
 """Whether a model of a transfer function is good enough, where it fails, which effects are missing, what to measure next."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,7 +38,8 @@ class Failure:
 class StatedParameter:
     """A parameter over all models that the points do not exclude.
 
-    low, high : 95 % interval that holds in each of them; uncertainty : standard, so that twice of it reaches its farther end
+    low, high : 95 % interval that holds in each of them; NaN for an end beyond what the fit searches, which the points leave open
+    uncertainty : standard, so that twice of it reaches the farther end; NaN if an end is open
     identified : whether it is known well enough to be stated; rival : the model that leaves it open, where one does
     """
 
@@ -86,7 +87,13 @@ class TransferDiagnosis(Judged[TransferFit]):
         known = known and all(self._reached(frequency) for frequency in self.extended.frequencies_of(name))
         if rival is not None and self.extended.logarithmic(name):
             known = known and reach < IDENTIFIED_SHARE * value
-        return StatedParameter(value, max(error, reach), low, high, known, rival)
+        stated = StatedParameter(value, max(error, reach), low, high, known, rival)
+        searched = next(p for p in self.extended.parameters if p.name == name)
+        if known or not searched.log or (low >= searched.low and high <= searched.high):
+            return stated
+        nothing = float("nan")
+        low, high = low if low >= searched.low else nothing, high if high <= searched.high else nothing
+        return replace(stated, uncertainty=nothing, low=low, high=high)
 
     def _reached(self, name: str) -> bool:
         """Whether the points reach a frequency in every model that they do not exclude."""

@@ -73,9 +73,9 @@ class TransferParameter(TypedDict):
     """A parameter of the fitted transfer function."""
 
     value: float
-    uncertainty: Annotated[float, "standard uncertainty"]
-    low: Annotated[float, "lower end of the 95 % interval"]
-    high: float
+    uncertainty: Annotated[float | None, "standard uncertainty; null if an end is open"]
+    low: Annotated[float | None, "lower end of the 95 % interval; null: the points leave it open"]
+    high: float | None
     unit: str
     identified: Annotated[bool, "whether the points determine it"]
 

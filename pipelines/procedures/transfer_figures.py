@@ -18,7 +18,6 @@ from pipelines.procedures.figures import FigureValue, probability, with_uncertai
 
 MOST_KEPT = 64
 _REACH = 20.0  # of the highest frequency of the points: what a model does above it is not measured
-_DAMPING = 1e-3, 1e2  # ratios beyond which the responses of a range of frequencies differ by less than any points show
 _last_judged: dict[str, TransferDiagnosis] = {}
 """Diagnoses of the last transfer functions: the report draws what the stage has judged in the same process."""
 
@@ -64,37 +63,33 @@ def figures_of_model(axis: str, diagnosis: TransferDiagnosis, points: Points, te
     top = float(points.conditions.frequency.max())
     return [
         replace(_bandwidth(axis, diagnosis, top), figure=names[0]),
-        _parameter(names[1], "natural_hz", axis, diagnosis, (0.0, _REACH * top)),
-        _parameter(names[2], "damping", axis, diagnosis, _DAMPING),
+        _parameter(names[1], "natural_hz", axis, diagnosis),
+        _parameter(names[2], "damping", axis, diagnosis),
     ]
 
 
-def _parameter(
-    figure: str, name: str, axis: str, diagnosis: TransferDiagnosis, within: tuple[float, float]
-) -> FigureValue:
+def _parameter(figure: str, name: str, axis: str, diagnosis: TransferDiagnosis) -> FigureValue:
     if not diagnosis.extended.has(name):
         return FigureValue.not_determined(figure, axis, f"the model has no {WORD.get(name, name)}")
     parameter = diagnosis.parameter(name)
     if parameter.identified:
         return FigureValue(figure, axis, parameter.value, parameter.uncertainty, parameter.low, parameter.high)
-    low, high, known = _interval(parameter.low, parameter.high, within)
-    note = f"not identified by these points: {known}"
+    note = f"not identified by these points: {_interval(parameter.low, parameter.high)}"
     if parameter.rival is not None:
         model, of_rival = " + ".join(parameter.rival.effects), parameter.rival.of(name)[0]
         note += f"; {model}, with {of_rival:.4g}, describes the points as well"
     where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)
     note += f"; measure at {where}" if where else "; sweep to higher frequencies"
-    return FigureValue.not_determined(figure, axis, note, low, high)
+    return FigureValue.not_determined(figure, axis, note, parameter.low, parameter.high)
 
 
-def _interval(low: float, high: float, within: tuple[float, float]) -> tuple[float, float, str]:
-    """Ends of a 95 % interval and its text; NaN for an end that lies beyond what the points can show."""
-    low, high = low if low > within[0] else float("nan"), high if high < within[1] else float("nan")
+def _interval(low: float, high: float, unit: str = "") -> str:
+    """A 95 % interval in words; NaN is an end that the points leave open."""
     if np.isnan(low) and np.isnan(high):
-        return low, high, "they leave it open"
-    if np.isnan(high):
-        return low, high, f"at least {low:.4g}, with 95 %"
-    return low, high, f"at most {high:.4g}, with 95 %" if np.isnan(low) else f"95 % interval {low:.4g} … {high:.4g}"
+        return "no limit on either side"
+    if np.isnan(low) or np.isnan(high):
+        return f"at most {high:.4g}{unit}, with 95 %" if np.isnan(low) else f"at least {low:.4g}{unit}, with 95 %"
+    return f"95 % interval {low:.4g} … {high:.4g}{unit}"
 
 
 def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
@@ -127,8 +122,8 @@ def _bandwidth(axis: str, diagnosis: TransferDiagnosis, top: float) -> FigureVal
     low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
     error = max(error, (value - low) / 1.96, (high - value) / 1.96)
     if error > IDENTIFIED_SHARE * value or value > 2.5 * top or len(ends) < len(found):
-        low, high, known = _interval(low, high, (0.0, _REACH * top))
-        note = f"not identified by these points to {top:.4g} Hz: {known}; sweep higher"
+        high = high if high < _REACH * top else float("nan")
+        note = f"not identified by these points to {top:.4g} Hz: {_interval(low, high)}; sweep higher"
         return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, low, high)
     return FigureValue("sweep_bandwidth_hz", axis, value, error, low, high)
 
@@ -225,8 +220,8 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
     for p in diagnosis.extended.parameters:
         parameter = diagnosis.parameter(p.name)
         if p.log and not parameter.identified:
-            text = f"{p.name}: 95 % interval {parameter.low:.4g} … {parameter.high:.4g} {p.unit}"
-            out.append(("not identified", text.removesuffix(" 1")))
+            known = _interval(parameter.low, parameter.high, "" if p.unit == "1" else f" {p.unit}")
+            out.append(("not identified", f"{p.name}: {known}"))
         elif p.name == "delay_s" and not diagnosis.unexplained:
             text = f"{1e6 * parameter.value:.2f} µs, 95 % interval {1e6 * parameter.low:.2f} … {1e6 * parameter.high:.2f} µs"
             if parameter.rival is not None:
