@@ -7,14 +7,11 @@ import numpy as np
 
 from inertial.arrays import Array, Flags
 from inertial.criticism.evidence import GROSS
-from inertial.data_errors.readings import design
+from inertial.data_errors.readings import FOLLOWS_G, design
 from inertial.errors import NotIdentified
 from inertial.estimation.lot import Lot
 from inertial.fits.ellipsoid import fit_ellipsoid
 from inertial.frames import force_from_angles
-
-_CONTRADICTED = 0.3
-"""Median residual over the spread of outputs, above which poses may be wrong: other rows, angles leave 0.4 to 1, 5° off 0.05."""
 
 _SPHERE = 12
 """Coefficients of the sphere on which outputs lie: biases, their temperature slopes, response without the mounting's rotation."""
@@ -34,7 +31,7 @@ def contradiction(lot: Lot) -> tuple[str, Lot]:
     spread = _spread(output[:, there])[:, None]
     output = output / spread[..., None]
     left = _misfit(lot, output, force, there)
-    for text, other, seen in _other_readings(lot, output, force, there) if left > _CONTRADICTED else ():
+    for text, other, seen in _other_readings(lot, output, force, there) if left > FOLLOWS_G else ():
         size = float(np.median(_spread(other[:, there])))
         if size * left > GROSS > _misfit(lot, output, other, seen):
             found = f"the recorded poses do not agree with the outputs in most dwells (residual {size * left:.2g} g): {text}"

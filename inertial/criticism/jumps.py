@@ -1,8 +1,8 @@
 """Jumps of single axes in place of an effect or of slow noise: telegraph noise of a few axes can imitate both.
 
 An effect has coefficients for every unit and axis, so that one effect explains independent jumps of three axes better than any
-single jump does. The jumps of a few axes together are therefore compared with the effect, at the same noise. Slow
-noise follows jumps up and down, too: each of them alone leaves it as it is, all of them together leave none.
+single jump does. The jumps of a few axes together are therefore compared with the effect, at the same noise. Slow noise follows
+jumps up and down, too: each of them alone leaves it as it is, all of them together leave none.
 """
 
 from collections.abc import Iterator, Sequence
@@ -87,7 +87,8 @@ def jumps_in_place_of_wander(field: Candidates, model: Model) -> tuple[Term, ...
     # the slow noise of a lot of many axes is not that of a few; a single jump is judged at the noise of every rival
     slow = [block for block in range(blocks) if blocks <= 2 * _AXES or shares.of_block(block) != shares.common]
     tried, most = tuple[Term, ...](), 0.0
-    for less in {shares.times(1.0, 0.0), shares.times(LESS_FLICKER, LESS_WALK), shares.times(0.0, 0.0)} - {shares}:
+    lower = [shares.times(*parts) for parts in ((1.0, 0.0), (LESS_FLICKER, LESS_WALK), (0.0, 0.0))]
+    for less in dict.fromkeys(each for each in lower if each != shares):
         space = model.at(model.noise_at(less))
         found = max((_best(field, space, block, {}) for block in slow), key=lambda jumps: jumps.score, default=_NONE)
         gain = _beyond_wander(field, model, found.terms) if found.terms and not _single_dwells(found.terms) else 0.0

@@ -17,8 +17,8 @@ _WARM = 2.5
 FAR_G = 0.02
 """Misfit, g, above which a dwell may be in another pose: more than a device's gain changes between two soaks."""
 
-_FOLLOWS_G = 0.3
-"""Median misfit, g, from which an output does not follow the poses: in poses of other rows it is 0.4 to 1, in noise more."""
+FOLLOWS_G = 0.3
+"""Median misfit, g, from which an output does not follow the poses: other rows leave 0.4 to 1, noise more, angles 5° off 0.05."""
 
 _ROUNDS = 12  # of reweighting
 _TUKEY = 4.685
@@ -109,7 +109,7 @@ class Readings:
     @cached_property
     def follows(self) -> Flags:
         """Whether the output of each unit follows its poses, (units,); else its response says nothing about the unit."""
-        follows: Flags = np.nanmedian(np.linalg.norm(self.misfit, axis=-1), axis=1) < _FOLLOWS_G
+        follows: Flags = np.nanmedian(np.linalg.norm(self.misfit, axis=-1), axis=1) < FOLLOWS_G
         return follows
 
     @cached_property

@@ -130,7 +130,7 @@ def refuse_outside(values: Array, column: str, where: str, *, label: str = "") -
         return
     row = int(bad[0])
     unit = f" {_UNITS[kind]}" if column in BOUNDS and (kind := column.rsplit("_", 1)[-1]) in _UNITS else ""
-    needed = f"{low:g}{unit} or more" if low in {0.0, 1.0} and high >= LARGEST_TIME_S else f"{low:g} to {high:g}{unit}"
+    needed = f"{low:g}{unit} or more" if values[row] < low and high >= LARGEST_TIME_S else f"{low:g} to {high:g}{unit}"
     raise DataRejected(
         f"{where}: row {row + 1}, column {shown(label or column)}: found {values[row]:g}, {needed} is needed; "
         "correct it, or its unit"

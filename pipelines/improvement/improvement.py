@@ -103,7 +103,8 @@ class Improvement:
         from pipelines.jobs.model_files import publish_model
 
         tables = self.tables
-        both_measured(tables.dwells, tables.history, tables.fresh, tables.fresh_history)  # refused before the diagnoses
+        if tables.fresh is not None:  # units of another run are refused before the diagnoses
+            both_measured(tables.dwells, tables.history, tables.fresh, tables.fresh_history)
         before = self._diagnosis(judged, first=True)
         choices = self._choices(before, named, yes=yes)
         added = [choice["effect"] for choice in choices if choice["added"]]
