@@ -146,7 +146,10 @@ class LevelFit:
         return np.concatenate([of_levels, self._common.T @ means])
 
     def _solution(self, target: Array) -> Array:
-        """Solution of the normal equations, from zero, so that what they do not determine stays zero."""
+        """Solution of the normal equations, from zero, so that what they do not determine stays zero.
+
+        scipy's `cg` measures its end without the preconditioner, and iterates rounding errors in what is not determined.
+        """
         x, left = np.zeros_like(target), target.copy()
         step = near = self._near(left)
         first = product = float((left * near).sum())
