@@ -27,7 +27,7 @@ ELSEWHERE = {
     "investigate": HERE + "test_the_lines_after_an_investigation_name_the_judged_model",
     "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
     "demo": HERE + "test_the_lines_of_the_demonstration_run_by_hand",
-    "certificate_revoke": "tests/unit/pipelines/chain/test_certify.py::test_a_certificate_is_offered_where_it_would_be_given",
+    "certificate": "tests/unit/pipelines/chain/test_certify.py::test_a_certificate_is_offered_where_it_would_be_given",
     "certificate_issue": "tests/unit/pipelines/cli/test_next_commands.py::test_the_line_about_documents_names_the_archive",
     "export": "tests/unit/pipelines/certificates/test_statement.py"
     "::test_failed_units_are_marked_in_their_files_and_no_certificate_is_offered_for_them",
