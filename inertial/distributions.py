@@ -40,19 +40,10 @@ def f_upper(probability: ArrayLike, first: ArrayLike, second: ArrayLike) -> Arra
     )
 
 
-def noncentral_f_tail(value: ArrayLike, first: ArrayLike, second: ArrayLike, noncentrality: ArrayLike) -> Array:
-    """Probability, above 1e-12, that F with a noncentrality exceeds a value; broadcast.
-
-    Beyond a noncentrality of some ten thousand the library gives no number: F then exceeds every value far below its mean.
-    """
-    first, second = _positive(first), _positive(second)
-    tail = np.asarray(1.0 - special.ncfdtr(first, second, noncentrality, value), dtype=np.float64)
-    certain = np.asarray(noncentrality, dtype=np.float64) > _FAR_ABOVE * (np.asarray(value) * first + 100.0)
-    return np.where(np.isnan(tail) & certain, 1.0, tail)
-
-
-_FAR_ABOVE = 10.0
-"""Noncentrality over the numerator of F from which on it is exceeded for certain."""
+def f_noncentrality(probability: ArrayLike, value: ArrayLike, first: ArrayLike, second: ArrayLike) -> Array:
+    """Noncentrality (within 1e-4 of it) with which F exceeds a value with a probability; broadcast."""
+    below = 1.0 - np.asarray(probability)
+    return np.asarray(special.ncfdtrinc(_positive(first), _positive(second), below, value), dtype=np.float64)
 
 
 def normal_tail(value: ArrayLike) -> Array:

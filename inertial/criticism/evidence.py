@@ -8,11 +8,10 @@ from inertial import effects as catalogue
 from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom, number_of
 from inertial.criticism.field import Candidates
-from inertial.distributions import f_upper, noncentral_f_tail
+from inertial.distributions import f_noncentrality, f_upper
 from inertial.estimation.bases import SEEN, unit_columns
 from inertial.estimation.model import Model
 from inertial.estimation.term import Term
-from inertial.roots import root
 
 FEWEST_DOF = 9
 """Degrees of freedom needed for a verdict if the noise is known from the residuals only: 18 positions of unknown orientation.
@@ -164,10 +163,7 @@ def _cubic(model: Model, field: Candidates) -> float | None:
     power = np.einsum("bnp,bnp->p", after, after) / max(space.variance, 1e-300)
     power = power[power > SEEN**2]
     limit = float(f_upper(_LEVEL / max(len(field.effects), 1), rank, left))
-
-    def excess(size: float) -> float:
-        return float(noncentral_f_tail(limit, rank, left, size**2 * float(power.min()))) - POWER
-
-    if not power.size or excess(_LARGEST) <= 0.0 or excess(_SMALLEST) >= 0.0:
+    if not power.size:
         return None
-    return root(excess, _SMALLEST, _LARGEST)
+    size = float(np.sqrt(f_noncentrality(POWER, limit, rank, left) / power.min()))
+    return size if _SMALLEST < size < _LARGEST else None

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.signal import butter, firwin, lfilter, lfilter_zi
 
 from inertial.arrays import Array
-from inertial.roots import root
 
 Kind = Literal["butterworth", "fir", "moving-average"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -40,7 +40,7 @@ class OutputFilter:
         if not below.size or below[0] == 0:
             return float(grid[0] if below.size else top)
         low, high = float(grid[below[0] - 1]), float(grid[below[0]])
-        return root(lambda f: float(self._size(np.array([f]))[0]) - _HALF, low, high)
+        return float(brentq(lambda f: float(self._size(np.array([f]))[0]) - _HALF, low, high))
 
     @property
     def delay_s(self) -> float:
@@ -110,7 +110,7 @@ def designed(kind: Kind, cutoff_hz: float, rate_hz: float) -> OutputFilter:
         return _of_taps(kind, rate_hz, firwin(max(count, 5), edge, fs=rate_hz)).cutoff_hz - cutoff_hz
 
     low, high = 0.2 * cutoff_hz, min(2.0 * cutoff_hz, 0.499 * rate_hz)
-    edge = root(off, low, high, within=1e-6 * cutoff_hz) if off(low) < 0.0 < off(high) else cutoff_hz
+    edge = brentq(off, low, high, xtol=1e-6 * cutoff_hz) if off(low) < 0.0 < off(high) else cutoff_hz
     return _of_taps(kind, rate_hz, firwin(max(count, 5), edge, fs=rate_hz))
 
 

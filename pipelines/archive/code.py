@@ -48,7 +48,7 @@ CODE = {
     ),
     "judge": (
         *(*_ENGINE, "inertial.criticism", "inertial.planning.drivers"),
-        *("inertial.planning.sequences", "inertial.probability", "inertial.roots", "inertial.timing"),
+        *("inertial.planning.sequences", "inertial.probability", "inertial.timing"),
         "pipelines.stages.judge",
     ),
     "verify": (*_ENGINE, "inertial.correction", "pipelines.stages.rms_error", "pipelines.stages.verify"),
