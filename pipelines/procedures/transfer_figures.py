@@ -268,7 +268,9 @@ def model_texts(diagnosis: TransferDiagnosis, points: Points, output: str = "") 
     turned = (
         "the output is turned over: its phase at low frequency is π; exchange the wires, or give it a negative sign"
     )
-    out.append(("polarity", turned if fit.sensitivity < 0.0 else "positive, the phase at low frequency is 0"))
+    agreement = np.cos(fit.residual.reshape(2, -1)[1] * points.phase_error)  # of drawn phases 0 with variance 1/2
+    if not diagnosis.unexplained or np.mean(agreement) > 3.0 / np.sqrt(2.0 * agreement.size):
+        out.append(("polarity", turned if fit.sensitivity < 0.0 else "positive, the phase at low frequency is 0"))
     share = float(np.sqrt(fit.chi_square / max(fit.dof, 1)))
     if fit.dof > 0 and fit.p_value > 1.0 - TOO_GOOD_P:
         text = (

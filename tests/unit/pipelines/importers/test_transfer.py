@@ -53,6 +53,16 @@ def test_of_points_that_scatter_far_beyond_their_stated_uncertainties_no_paramet
     assert not any(parameter["identified"] for parameter in diagnosis["parameters"].values())
     (told,) = (line for line in diagnosis["text"] if "delay" in line and not line.startswith("model:"))
     assert told.startswith("not determined: bandwidth, natural frequency, damping ratio, delay: the model, also with")
+    assert any(line.startswith("polarity: positive") for line in diagnosis["text"])
+
+
+def test_phases_that_follow_nothing_tell_no_polarity(tmp_path: Path) -> None:
+    path, rng = written(tmp_path / "a.csv"), np.random.default_rng(4)
+    table = pd.read_csv(path)
+    table["phase_deg"] = rng.uniform(-180.0, 180.0, len(table))
+    table.to_csv(path, index=False)
+    words = ("import", path, "--procedure", "sweep", "--units", "S1", "--archive", tmp_path / "archive")
+    assert "polarity" not in " ".join(document_of(*words, status=1)["text"])
 
 
 @each([
