@@ -21,6 +21,7 @@ from pipelines.cli.options import (
 )
 from pipelines.cli.printing import conclude, error_console, print_table, say, short, short_values
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
+from pipelines.importers.documents import TransferImport, WaveformImport
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.tables import ADEQUATE, NOT_JUDGED
@@ -136,8 +137,22 @@ def command(
     if procedure and not units:
         raise WrongUse(f"import: no serial number, --procedure {procedure} needs one; add --units SN")
     if procedure:
-        said = (listed, stated_units, rate, given.get("group", ""))
-        _tests(files, procedure, file, units, said, effects, archive, device, waveforms=waveforms, as_json=as_json)
+        kind, slip = stated_device(device)
+        if waveforms:
+            from pipelines.importers.waveforms import RecordingLayout, import_waveforms
+
+            channels = mapped.pairs(listed, "--map"), mapped.pairs(stated_units, "--unit-of")
+            layout = RecordingLayout(*channels, rate, given.get("group", ""))
+            recorded = import_waveforms(files, procedure, file, units, layout, archive, kind)
+            _conclude_waveforms(recorded, slip, as_json=as_json)
+        from pipelines.importers.transfer import import_transfer
+        from pipelines.importers.transfer_columns import stated_layout
+
+        model = [effect.strip() for effect in (effects or "second_order,delay").split(",")]
+        points = stated_layout(listed, stated_units, file)
+        _conclude_transfers(
+            [import_transfer(path, units, model, archive, points, kind) for path in files], slip, as_json=as_json
+        )
     from pipelines.diagnosis.import_document import import_document
 
     keys: dict[str, Any] = mapped.from_file(file) if file else {}
@@ -182,42 +197,16 @@ def _settings(given: list[str] | None) -> tuple[Path | None, dict[str, Any]]:
     return (Path(files[0]) if files else None), keys
 
 
-def _tests(
-    files: list[Path],
-    procedure: str,
-    part: Path | None,
-    unit: str,
-    stated: tuple[str, str, float | None, str],
-    effects: str,
-    archive: str | None,
-    device: str,
-    *,
-    waveforms: bool,
-    as_json: bool,
-) -> NoReturn:
-    """Judge, keep and print the recordings of one unit, or transfer functions, of one file each.
+def _conclude_waveforms(imported: WaveformImport, slip: tuple[str, ...], *, as_json: bool) -> NoReturn:
+    """Print a dynamic test; a part failed where its model is not adequate, or a figure that was recorded is not determined."""
+    imported["text"] += slip
+    held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
+    passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
+    conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
 
-    A part failed where a model is not adequate or cannot be judged, or a figure that the recordings hold is not determined.
 
-    stated : columns and units as the options have them, rate in Hz, group
-    """
-    from pipelines.importers.mapping import pairs
-    from pipelines.importers.transfer import import_transfer
-    from pipelines.importers.transfer_columns import stated_layout
-    from pipelines.importers.waveforms import RecordingLayout, import_waveforms
-
-    columns, units, rate, group = stated
-    device, slip = stated_device(device)
-    if waveforms:
-        layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
-        imported = import_waveforms(files, procedure, part, unit, layout, archive, device)
-        imported["text"] += slip
-        held = [figure["identified"] for figure in imported["figures"] if figure["measured"]]
-        passed = bool(held) and all(held) and imported["verdict"] in {"", ADEQUATE}
-        conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
-    model = [effect.strip() for effect in (effects or "second_order,delay").split(",")]
-    points = stated_layout(columns, units, part)
-    transfers = [import_transfer(path, unit, model, archive, points, device) for path in files]
+def _conclude_transfers(transfers: list[TransferImport], slip: tuple[str, ...], *, as_json: bool) -> NoReturn:
+    """Print transfer functions; a part failed where a model is not adequate or cannot be judged."""
     for transfer in transfers:
         transfer["text"] += slip
     document = dict(transfers[0]) if len(transfers) == 1 else {"imports": transfers}
