@@ -1,7 +1,5 @@
 """Files of R, written here in R's own text format (R Internals, 1.8, "Serialization Formats"): the truth of the reader."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,7 +7,7 @@ import pytest
 from pipelines.importers.readers import rdata as reader
 from schemas.errors import DataRejected
 
-rdata = pytest.importorskip("rdata")
+pytest.importorskip("rdata")
 
 OBJECT, ATTRIBUTES, TAG = 0x100, 0x200, 0x400
 SYMBOL, PAIRS, TEXT, LOGICAL, INTEGER, REAL, TEXTS, LIST, END, UTF8 = 1, 2, 9, 10, 13, 14, 16, 19, 254, 0x8000
@@ -81,14 +79,5 @@ def test_every_kind_of_column_has_the_values_that_were_written(name: str) -> Non
     assert table[["unit", "pose"]].isna().sum().tolist() == [1, 1]
     assert table["when"].tolist()[0] == pd.Timestamp("2026-01-01 00:00:00.25")
     assert table["when"].isna().tolist() == [False, True, False]
-
-
-def test_a_file_that_another_program_wrote_is_the_same_table_and_one_without_a_data_frame_is_refused(
-    tmp_path: Path,
-) -> None:
-    written = pd.DataFrame({"t": [0.0, 0.1], "ax": [1.5, np.nan], "still": [True, False]})
-    rdata.write_rda(tmp_path / "a.rda", {"imu": written}, compression=None)
-    table = reader.read("a.rda", (tmp_path / "a.rda").read_bytes(), "").table
-    pd.testing.assert_frame_equal(table, written)
     with pytest.raises(DataRejected, match="no data frame in this file of R, one is needed"):
         reader.read("a.rds", saved(vector(REAL, [1.0, 2.0])), "")
