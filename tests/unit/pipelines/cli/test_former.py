@@ -2,7 +2,6 @@
 
 import shlex
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 
 from each import each
@@ -88,11 +87,7 @@ def test_the_help_has_thirty_commands_and_hundred_options_at_most() -> None:
     assert len(COMMANDS) <= 30
     names = set()
     for name in COMMANDS:
-        assert import_module(f"pipelines.cli.{COMMANDS[name].module}").EXAMPLES
         for _, leaf in leaves(get_command(app).get_command(None, name)._load(), name):
-            names |= {
-                max(parameter.opts, key=len)
-                for parameter in leaf.params
-                if parameter.param_type_name == "option" and not parameter.hidden
-            }
+            shown = [one for one in leaf.params if one.param_type_name == "option" and not one.hidden]
+            names |= {max(one.opts, key=len) for one in shown}
     assert len(names) <= 100, sorted(names)

@@ -40,9 +40,7 @@ def told(made: dict[str, Any], model: Path | None) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in lines]
 
 
-def test_an_improvement_alternatives_and_a_refuted_effect_have_model_fresh_run_output_author_and_dwells_left_out() -> (
-    None
-):
+def test_an_improvement_alternatives_and_a_refuted_effect_have_all_that_the_command_before_was_given() -> None:
     (words,) = told(document(), Path("model.toml"))
     assert words[:2] == ["improve", "dwells.csv"]
     assert has(words, ("--model", "model.toml", *TEMPERATURES, *ARCHIVE, *EFFECTS, *LEFT, *AGAIN, *KEPT))
@@ -68,11 +66,7 @@ def test_an_extension_has_the_effects_and_its_ladder_the_fresh_run() -> None:
     assert has(second, EFFECTS)
     assert "--formula" not in second
     assert has(ladder, ("--dwells", "dwells.csv", *TEMPERATURES, *ARCHIVE, *EFFECTS, *LEFT, *AGAIN))
-    assert (
-        unknown_options(shlex.join(["tumbleline", *first]))
-        == unknown_options(shlex.join(["tumbleline", *ladder]))
-        == set()
-    )
+    assert [unknown_options(shlex.join(["tumbleline", *words])) for words in (first, ladder)] == [set(), set()]
 
 
 CASES: dict[str, tuple[dict[str, Any], str, tuple[str, ...]]] = {
