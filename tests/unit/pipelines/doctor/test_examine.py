@@ -17,6 +17,7 @@ from email.utils import formatdate
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from each import each
@@ -68,9 +69,6 @@ def only_fault(checks: list[Check]) -> Check:
     return fault
 
 
-# the archive and its key
-
-
 def test_a_healthy_archive_is_good_and_holds_nothing_of_the_check_afterwards(tmp_path: Path) -> None:
     archive_in(tmp_path / "a")
     before = sorted((tmp_path / "a").rglob("*"))
@@ -105,43 +103,29 @@ def test_what_is_wrong_with_an_archive_is_named(case: tuple, tmp_path: Path) -> 
     assert remedy in fault.remedy
 
 
-@contextmanager
-def as_nobody() -> Iterator[None]:
-    """A block without the rights of root, where the tests run as root."""
-    root = os.geteuid() == 0
-    if root:
-        os.seteuid(NOBODY)
-    try:
-        yield
-    finally:
-        if root:
-            os.seteuid(0)
-
-
 @pytest.fixture
-def open_folder() -> Iterator[Path]:
-    """A folder that every user may enter: those of pytest are for their owner only."""
-    folder = Path(tempfile.mkdtemp(prefix="tumbleline-test-"))
+def of_nobody() -> Iterator[Path]:
+    """An archive of a user without rights, who the test is meanwhile: pytest's folders are for their owner only."""
+    folder, root = Path(tempfile.mkdtemp(prefix="tumbleline-test-")), os.geteuid() == 0
     folder.chmod(0o755)
-    yield folder
+    archive_in(folder / "a")
+    if root:
+        os.chown(folder / "a", NOBODY, NOBODY)
+        os.seteuid(NOBODY)
+    yield folder / "a"
+    if root:
+        os.seteuid(0)
     shutil.rmtree(folder)
 
 
-@each([(0o555, "writable"), (0o000, "reachable")])
-def test_an_archive_without_permission_to_write_or_to_look_into_it_is_a_fault(
-    case: tuple[int, str], open_folder: Path
-) -> None:
-    folder = open_folder / case[1]
-    archive_in(folder)
-    assert "fault" not in states(archive_checks(str(folder), 0.0)).values()
-    folder.chmod(case[0])
-    try:
-        with as_nobody():
-            fault = only_fault(archive_checks(str(folder), 0.0))
-    finally:
-        folder.chmod(0o755)
-    assert fault.check == case[1]
-    assert "Permission denied" in fault.found
+def test_an_archive_without_permission_to_write_or_to_look_into_it_is_a_fault(of_nobody: Path) -> None:
+    for mode, check in ((0o555, "writable"), (0o000, "reachable")):
+        of_nobody.chmod(mode)
+        fault = only_fault(archive_checks(str(of_nobody), 0.0))
+        assert fault.check == check
+        assert "Permission denied" in fault.found
+        of_nobody.chmod(0o755)
+        assert "fault" not in states(archive_checks(str(of_nobody), 0.0)).values()
 
 
 FULL = """
@@ -198,9 +182,6 @@ def test_a_key_is_usable_private_and_outside_the_archive(tmp_path: Path, monkeyp
     make_key(inside)
     monkeypatch.setenv("TUMBLELINE_SIGNING_KEY", str(inside))
     assert only_fault(key_checks(str(tmp_path / "a"))).check == "outside the archive"
-
-
-# the orchestrator
 
 
 @contextmanager
@@ -281,9 +262,6 @@ def test_an_address_is_a_fault_where_it_is_none_or_nobody_answers_there_and_none
     assert "secret" not in repr(fault)
 
 
-# a station
-
-
 def test_a_station_that_answers_is_good_and_nothing_moved(tmp_path: Path) -> None:
     with served_plant() as (port, plant):
         config = modbus_station(port)
@@ -308,9 +286,6 @@ def test_a_station_that_does_not_answer_or_whose_file_is_wrong_is_a_fault_and_no
     (tmp_path / "s.toml").write_text("name = 3\n", encoding="utf-8")
     assert only_fault(station_checks(tmp_path / "s.toml")).check == "file"
     assert states(station_checks(None)) == {"file": "not configured"}
-
-
-# the host and its software
 
 
 def test_the_clock_is_what_the_kernel_says_and_a_difference_the_least_that_is_sure(
@@ -345,10 +320,6 @@ def test_a_library_that_is_missing_or_of_another_version_is_named(
     name, held, check, state = case
     version, distributions = metadata.version, metadata.distributions
 
-    class Other:
-        def __init__(self) -> None:
-            self.name, self.version = name, held
-
     def changed(asked: str) -> str:
         if asked.lower() != name:
             return version(asked)
@@ -357,13 +328,11 @@ def test_a_library_that_is_missing_or_of_another_version_is_named(
         return held
 
     monkeypatch.setattr(software.metadata, "version", changed)
-    monkeypatch.setattr(software.metadata, "distributions", lambda: [*distributions(), *([Other()] if held else [])])
+    other = [SimpleNamespace(name=name, version=held)] if held else []
+    monkeypatch.setattr(software.metadata, "distributions", lambda: [*distributions(), *other])
     rows = {row.check: row for row in software.software_checks()}
     assert rows[check].state == state
     assert "pip install" in rows[check].remedy
-
-
-# the command
 
 
 def test_the_command_says_the_remedy_and_leaves_with_its_status(tmp_path: Path) -> None:
