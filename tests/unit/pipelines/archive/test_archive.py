@@ -56,7 +56,6 @@ def test_a_manifest_says_from_what_and_with_what_its_key_depends_on_that_and_a_f
 ) -> None:
     manifest = run.manifest("coefficients")
     assert manifest["inputs"] == {name: run.manifest(name)["sha256"] for name in ("dwells", "history")}
-    assert manifest["parameters"]["effects"][0] == "bias"
     assert {"who", "where", "when", "libraries", "code", "schema"} <= manifest.keys()
     changes = [(dwells, effect, code) for dwells in "12" for effect in ("bias", "scale") for code in ("code", "new")]
     keys = [stage_key("fit", {"dwells": one[0]}, {"effects": [one[1]]}, one[2]) for one in changes * 2]
@@ -113,7 +112,6 @@ def test_one_process_at_a_time_measures_a_lot(tmp_path: Path) -> None:
 def test_a_key_takes_in_the_sources_of_what_its_stage_uses_and_imports_none_of_them() -> None:
     assert {"inertial.effects.third_order", "inertial.effects.covariate"} <= set(sources(CODE["fit"]))
     assert {"inertial.noise.allan", "inertial.noise"} <= set(sources(("inertial.noise",)))
-    assert list(sources(CODE["fit"])) == sorted(sources(CODE["fit"]))
     for name in ("inertial.no_such_module", "no_such_package", "inertial.counts.number_of"):
         with pytest.raises(LookupError, match=name):
             sources((name,))

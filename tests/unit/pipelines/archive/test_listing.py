@@ -66,7 +66,6 @@ def test_a_line_of_an_older_version_is_read_again_and_is_no_edit(archive: Archiv
     files.publish(place, files.json_bytes({"runs": older, "seal": derived.seal({"runs": digest(older)})}))
     name, (_, line) = next(iter(older.items()))
     info = listing.info_of(Run(archive, name))
-    assert info is not None
     assert listing.agrees(info, line)
     assert not listing.agrees(info, [*line[:2], "another device", *line[3:]])
     assert all(info.station == "st-1" for info in archive.runs())  # not in the older lines

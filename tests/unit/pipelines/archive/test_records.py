@@ -63,7 +63,6 @@ def test_pieces_are_published_with_their_record_or_not_at_all(tmp_path: Path) ->
     assert records.finished() == {0}
     pd.testing.assert_frame_equal(pd.concat(records.samples(), ignore_index=True), samples)
     assert [len(piece) for piece in records.samples()] == [100, 100, 100]
-    assert len(records.gathered("samples")) == len(samples)
 
 
 def test_pieces_of_a_killed_or_spoilt_attempt_do_not_reach_the_next(tmp_path: Path) -> None:

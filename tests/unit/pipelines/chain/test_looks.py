@@ -55,7 +55,6 @@ def job_of(folder: Path, bias: float) -> Job:
 
 def at_the_end(run: Run, job: Job, terms: StopTerms, told: frozenset[str] = frozenset()) -> Look:
     """What a look at all records of the run says."""
-    assert run.records is not None
     return LotLooks(job, terms, run.records).look(int(run.table("readings")["record"].max()), told)
 
 
@@ -74,7 +73,6 @@ def run() -> Run:
 
 def test_a_lot_that_knows_enough_ends(run: Run) -> None:
     end = early_end(run)
-    assert end is not None
     assert end["ended"]
     taken = run.table("readings").drop_duplicates("record")["kind"].value_counts()
     assert 10 <= taken["dwell"] < 24
@@ -85,7 +83,6 @@ def test_a_lot_that_knows_enough_ends(run: Run) -> None:
 def test_what_the_look_says_is_what_the_run_states(run: Run, tmp_path: Path) -> None:
     """U of a look at all records is that of the run's budget, its guard apart: there is one estimate."""
     job, terms = job_of(tmp_path, 800.0), StopTerms(bias_ug=800.0)
-    assert run.records is not None
     stated = run.table("uncertainties").query("quantity == 'bias'")["u"].max()
     guard = noise_guard(int(run.table("wander")["dof"].sum()), len(LotLooks(job, terms, run.records)._due))
     told = f"U at most {2.0 * stated / 800.0:.2f} of what is asked (times {guard:.2f} as allowance for its noise), "
@@ -127,7 +124,6 @@ def test_an_uncertainty_that_was_asked_for_and_not_reached_is_said(
     if not stated:
         monkeypatch.setattr(Run, "table", lambda run, name: sums[:0] if name == "uncertainties" else tables(run, name))
     end = early_end(run)
-    assert end is not None
     found = {one["unit"]: one["share"] for one in end["not_reached"] if one["figure"] == "bias"}
     by_unit = sums[sums["quantity"] == "bias"].groupby("unit")["u" if stated else "u_a"].max()
     assert found == pytest.approx((by_unit / 50.0).to_dict())
@@ -139,7 +135,6 @@ def test_the_period_counts_from_dwells_as_long_as_they_were(run: Run) -> None:
     tables = BudgetTables(**{name: run.table(name) for name in names})
     longer = replace(tables, dwells=tables.dwells.assign(duration_s=3.0))
     terms = archived_terms(run.about)
-    assert terms is not None
     assert not terms.dwells_chosen
     chosen = replace(terms, dwells_chosen=True)
     assert [lot_budget(longer, one).terms.dwell_s for one in (terms, chosen)] == [1.0, 3.0]

@@ -16,7 +16,6 @@ from pipelines.cli.former import OPTIONS, present
 NOW = {
     "certify latest --from 2026-01-01 --months 12": "certificate issue latest --since 2026-01-01 --until 12m",
     "certificate latest --password-file p --sign-with k": "certificate write latest --sign-with k,p",
-    "certificate write latest": "certificate write latest",
     "certificate --help": "certificate --help",
     "revoke --certificate 2 SN1": "certificate revoke SN1 2",
     "choose --range 4g --error=2mg --device A": "plan choose --device A range=4g error=2mg",
@@ -25,16 +24,12 @@ NOW = {
     "import a.csv --units output=g --unit SN1 --poses a=+x": "import a.csv --unit-of output=g --units SN1 --set poses=a=+x",
     "import a.csv --units SN1": "import a.csv --units SN1",
     "correct a.csv --cutoff 9 --filter=fir --calibration latest:A1": "correct a.csv --filter=fir:9 latest:A1",
-    "correct a.csv --cutoff 9": "correct a.csv --filter :9",
     "plan r --noise 25 --wander 8": "plan r --noise 25,8",
     "plan optimise r --criterion T --part a,b --ramp": "plan optimise --set ramp=yes r --criterion T:a,b",
-    "plan optimize r --factor 2": "plan optimize r --set factor=2",
     "monitor --port 9000 --serve": "station monitor --port 9464 --port 9000",
-    "query 'select 1' --csv": "archive query --output - 'select 1'",
     "extend m.toml --remove x --why -- --why": "extend m.toml --remove x --reason -- --why",
     "release --list": "release",
     "simulate a --no-noise --failed --time t": "simulate --seed none --include failed a --map time=t",
-    "run my.toml --no-prompts": "run my.toml --yes",
     "": "",
 }
 

@@ -74,7 +74,6 @@ def test_what_the_verdict_rests_on_stands_beside_it() -> None:
     hidden = slow_noise(diagnose(hand_turned.make("warm_up", 1, 1.5)))
     assert hidden.startswith("white noise is 24.9 µg, the rest counts as slow noise")
     assert "warm_up below 1" in hidden
-    assert few["condition"] > 1.0
 
 
 @pytest.mark.slow
@@ -134,10 +133,9 @@ def test_what_the_norm_does_not_determine_is_refused_by_name(row: tuple[tuple[st
 
 @pytest.mark.slow
 def test_a_memory_that_was_at_rest_has_no_column_for_its_state() -> None:
-    for size, named in ((2000.0, None), (2300.0, True)):  # the p of the smaller, 4.1e-6, is that of one in 245 tests
-        document = diagnose(make(Recording(60, "white 280, B 30", warm_up=size), 96_005_004).dwells)
-        assert document["adequate"] is False
-        assert named is None or any("warm_up" in group["effects"] for group in document["classes"])
+    document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2300.0), 96_005_004).dwells)
+    assert document["adequate"] is False
+    assert any("warm_up" in group["effects"] for group in document["classes"])
     # a class of several names the effect that its parameters are of
     group = {"effects": ["aging_linear", "warm_up"], "scope": "sensor"}
     group |= {"nonlinear": {"tau": 7200.0}, "nonlinear_of": "warm_up"}

@@ -88,7 +88,6 @@ def test_numbers_are_quantities_where_they_have_fractions_or_are_dates() -> None
     assert as_numbers(["1", "2", "13"]) is None  # numbers of wafers
     assert as_numbers(["0.5", "2", ""]) == {"0.5": 0.5, "2": 2.0}
     dates = as_numbers(["2026-03-01", "2026-03-04"])
-    assert dates is not None
     assert dates["2026-03-04"] - dates["2026-03-01"] == 3.0
     assert as_numbers(["W1", "0.5"]) is None
     assert as_numbers(["2026-02-28", "2026-02-30"]) is None  # of an earlier version, with a day that does not exist

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from pipelines.drawing import Chart, ColourScale, Plot, PlotAxis, Trace, csv_text, plotly_figure, svg_text
-from pipelines.drawing.chart import DIVERGING, ROLES, SEQUENTIAL, density
+from pipelines.drawing.chart import ROLES, density
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.drawing.picture import picture
 from pipelines.report.run_pictures import samples_chart
@@ -95,20 +95,7 @@ def test_samples_are_a_line_unless_one_beside_a_gap_would_be_hidden(rng: np.rand
         values[40:60:2] = np.nan
 
 
-def contrast(one: str, other: str) -> float:
-    """Contrast of two colours (WCAG 2.2)."""
-    light = []
-    for text in (one, other):
-        parts = [int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
-        linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]
-        light.append(0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2])
-    return (max(light) + 0.05) / (min(light) + 0.05)
-
-
-def test_no_colour_of_a_scale_is_that_of_a_page_and_one_colour_of_a_legend_means_one_thing() -> None:
-    for _, colour in (*DIVERGING, *SEQUENTIAL):
-        for page in ("#ffffff", "#f4f6f8", "#22252a", "#1a2026"):
-            assert contrast(colour, page) > 1.6, (colour, page)
+def test_one_colour_of_a_legend_means_one_thing() -> None:
     apart = ("x", "y", "z", "fourth", "before", "after", "muted", "ink", "good")
     assert len({ROLES[role] for role in apart}) == len(apart)
 

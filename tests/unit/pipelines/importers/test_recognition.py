@@ -48,28 +48,11 @@ def logger_of_imu(rng: Rng, at: Path) -> Path:
     return csv(at / "a.csv", columns, sep=" ")
 
 
-def board_without_header(rng: Rng, at: Path) -> Path:
-    """Tab-divided, without names: time, m/s² with a bias of half a g on z, °/s, raw magnetometer, pressure, °C; 20 Hz."""
-    hand = Hand(rng, stops=14, rate=20.0, rest_s=5.0)
-    columns = {"t": hand.time}
-    named(columns, "a b c", G * accelerations(rng, hand.force, bias=(0.0, 0.0, 0.48)))
-    named(columns, "d e f", np.degrees(sensed(rng, hand.rate, 1.0, (0.02, 0.0, 0.0), 0.005)))
-    named(columns, "g h i", np.rint(rng.normal(50.0, 30.0, (hand.n, 3))) % 65536.0)
-    columns |= {"j": np.zeros(hand.n), "k": 97.99 + 0.002 * rng.normal(size=hand.n), "l": 34.6 + 0.01 * hand.time}
-    return csv(at / "a.txt", columns, header=False, sep="\t")
-
-
 def positions_without_header(rng: Rng, at: Path) -> Path:
     """Means of counts in thirty positions, nothing else."""
     means = accelerations(rng, Hand(rng, stops=30).stops, 16384.0)
     np.savetxt(at / "a.txt", np.round(means, 3), delimiter=",", fmt="%.3f")
     return at / "a.txt"
-
-
-def numbered_positions(rng: Rng, at: Path) -> Path:
-    columns = {"No": np.arange(1.0, 25.0), "Temp": np.full(24, 23.4)}
-    named(columns, "Vx Vy Vz", np.round(accelerations(rng, Hand(rng, stops=24).stops), 5))
-    return csv(at / "a.csv", columns)
 
 
 def matrix_with_clock(rng: Rng, at: Path) -> Path:
@@ -147,9 +130,7 @@ def references_beside_means(rng: Rng, at: Path) -> Path:
 RIGHT = {
     references_beside_means: ("x_mean (g) y_mean (g) z_mean (g)", "g", "", True),
     logger_of_imu: ("ax ay az", "LSB", "us", False),
-    board_without_header: ("2 3 4", "m/s^2", "s", False),
     positions_without_header: ("1 2 3", "LSB", "", True),
-    numbered_positions: ("Vx Vy Vz", "g", "", True),
     matrix_with_clock: ("IMU0x2Dalpha_2 IMU0x2Dalpha_3 IMU0x2Dalpha_4", "LSB", "s", False),
     bursts: ("ax ay az", "g", "ms", False),
     maker_of_sensors: ("Acc_X Acc_Y Acc_Z", "m/s^2", "samples", False),
@@ -258,13 +239,9 @@ def test_the_three_columns_their_unit_and_the_clock_are_recognised(
         assert seen.rate_hz == pytest.approx(8.0 / 0.0135, rel=0.01)
         assert seen.guessed.column("temperature") == "gtemp"
     assert seen.gaps == 1 or write is not logger_of_imu
-    if (
-        write is references_beside_means
-    ):  # and the spread, by their names; the poses are known: it is fitted as a run is
-        names = {f"force_{axis}": f"{axis}_true (g)" for axis in "xyz"} | {
-            f"sd_{axis}": f"{axis}_std" for axis in "xyz"
-        }
-        assert names.items() <= seen.keys["columns"].items()
+    if write is references_beside_means:  # by their names; the poses are known, and it is fitted as a run is
+        means = {f"force_{axis}": f"{axis}_true (g)" for axis in "xyz"}
+        assert (means | {f"sd_{axis}": f"{axis}_std" for axis in "xyz"}).items() <= seen.keys["columns"].items()
         assert seen.for_fit().fit == ""
 
 
@@ -312,11 +289,9 @@ def test_a_record_that_never_rests_has_no_stops_and_a_noisy_one_at_rest_has(rng:
         columns = {"time [s]": time}
         named(columns, "ax[g] ay[g] az[g]", output + 0.002 * rng.normal(size=force.shape))
         seen = recognise([csv(tmp_path / f"{name}.csv", columns)])
-        assert seen.stops is not None
         assert len(seen.stops.found) == stops
         told = inspect([tmp_path / f"{name}.csv"]).document["remarks"]
         assert any("no position at rest" in text for text in told) is (stops == 0)
-        assert seen.keys is not None
         made = imported(pd.DataFrame(columns), build(seen.keys, name), name)
         assert (0 if made.dwells is None else len(made.dwells)) == stops
         assert any("are no rest" in text for text in made.remarks) is (stops == 0)
@@ -330,7 +305,6 @@ def test_files_that_follow_one_another_are_positions_of_their_own(rng: Rng, tmp_
         named(columns, "ax[g] ay[g] az[g]", accelerations(rng, np.tile(force, (400, 1))))
         paths.append(csv(tmp_path / f"face-{k}.csv", columns))
     seen = recognise(paths, join="rows")
-    assert seen.stops is not None
     assert seen.stops.found.spans == tuple((400 * k, 400 * (k + 1)) for k in range(6))
     assert seen.import_command.endswith("--set join=rows")
 
@@ -391,15 +365,11 @@ def test_columns_named_as_in_the_exchange_format_serials_and_numbers_of_dwells_a
     seen = recognise([tmp_path / "lot.csv"])
     assert (in_turn.keys, in_turn.rate_hz, in_turn.open) == (seen.keys, seen.rate_hz, ())
     expected = {meaning: renamed.get(name, name) for meaning, name in IN_EXCHANGE_FORMAT.items()}
-    assert seen.keys is not None
     assert seen.keys["columns"] == expected | {"x": "ax", "y": "ay", "z": "az"}
     assert (seen.keys["units"], seen.keys["rows"], seen.open) == ({"output": "g"}, "dwells", ())
     assert "--units " not in seen.import_command
-    proposal = seen.for_fit()
-    assert proposal is not None
-    assert proposal.fit == ""  # its poses are known
-    dwells = imported(file, build(proposal.keys, "t"), "lot.csv").dwells
-    assert dwells is not None
+    assert seen.for_fit().fit == ""  # its poses are known
+    dwells = imported(file, build(seen.for_fit().keys, "t"), "lot.csv").dwells
     assert sorted(set(dwells["unit"])) == ["S1", "S2", "S3"]
     assert dwells["dwell"].tolist() == [*range(3, 27)] * 3
     file.drop(columns=renamed.get("dwell", "dwell")).to_csv(tmp_path / "unnumbered.csv", index=False)
@@ -410,10 +380,8 @@ def test_labels_at_which_the_time_begins_anew_are_units_whatever_they_are_called
     file = dwells_of_units(rng).rename(columns={"unit": "Prüfling", "dwell": "Lage", "time_s": "Zeit [s]"})
     file.drop(columns=["slot", "since_power_s", "since_move_s", "duration_s"]).to_csv(tmp_path / "lot.csv", index=False)
     seen = recognise([tmp_path / "lot.csv"])
-    assert seen.keys is not None
     assert [seen.keys["columns"].get(one) for one in ("unit", "time", "dwell")] == ["Prüfling", "Zeit [s]", None]
     dwells = imported(file, build(seen.keys, "t"), "lot.csv").dwells
-    assert dwells is not None
     assert sorted(set(dwells["unit"])) == ["S1", "S2", "S3"]
     whole = file.assign(**{"Zeit [s]": np.arange(len(file)) * 60.0}).rename(columns={"Prüfling": "Kammer"})
     whole.to_csv(tmp_path / "soaks.csv", index=False)  # one clock throughout: the labels may be those of soaks
@@ -427,7 +395,6 @@ def test_names_of_the_exchange_format_in_a_record_of_samples_are_no_dwells(rng: 
     columns["supply_V"] = np.full(hand.n, 3.3)
     named(columns, "ax ay az", np.round(accelerations(rng, hand.force, 1000.0), 2))
     seen = recognise([csv(tmp_path / "a.csv", columns)])
-    assert seen.keys is not None
     assert seen.keys["columns"] == {"time": "time_s", "x": "ax", "y": "ay", "z": "az", "supply": "supply_V"}
     assert "rows" not in seen.keys
     columns["unit"] = np.where(hand.time < 30.0, "S1", "S2")

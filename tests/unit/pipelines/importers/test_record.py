@@ -33,12 +33,6 @@ def read(frame: pd.DataFrame, columns: dict[str, str], stated: Content | None = 
     return imported(frame, build(content, "t"), "f.csv", stated)
 
 
-def dwells_of(frame: pd.DataFrame, columns: dict[str, str], stated: Content | None = None, **more: object):
-    dwells = read(frame, columns, stated, **more).dwells
-    assert dwells is not None
-    return dwells
-
-
 @each(range(8))
 def test_one_frozen_dwell_of_known_pose_is_a_stuck_output(seed: int) -> None:
     rng = np.random.default_rng([4_401, seed])
@@ -56,8 +50,8 @@ def test_dwells_of_a_file_in_which_an_axis_stands_still_are_refused_or_left_out(
     frame.loc[7, "sy"] = 0.0
     with pytest.raises(DataRejected, match=r"axis y is constant in dwell 'dwell 7' \(row 8\).*1 such dwells"):
         read(frame, spreads)
-    assert len(dwells_of(frame, spreads, faulty="leave-out")) == 11
-    assert len(dwells_of(frame, spreads, faulty="keep")) == 12
+    assert len(read(frame, spreads, faulty="leave-out").dwells) == 11
+    assert len(read(frame, spreads, faulty="keep").dwells) == 12
 
 
 @each({"2026-03-29 00:55": "forward", "2026-10-25 00:30": "back", "2026-10-28 00:30": ""}.items())
@@ -138,7 +132,7 @@ def test_times_in_a_doubtful_or_another_unit_than_claimed_are_asked_about_refuse
     # a unit is read from a name and not from a letter
     assert [clocks.recognised(STEPS * 1.0, n).unit for n in ("time_ms", "s", "SampleTimeFine")] == ["ms", "", ""]
     frame = of_size(rng).assign(when=60_000.0 * np.arange(12))  # of dwells the unit that the file states counts
-    dwells = dwells_of(frame, {"time": "when"}, Content(frame, units={"when": "ms"}))
+    dwells = read(frame, {"time": "when"}, Content(frame, units={"when": "ms"})).dwells
     np.testing.assert_allclose(dwells["time_s"], 60.0 * np.arange(12))
 
 
@@ -184,7 +178,7 @@ def test_recorded_quantities_of_a_file_are_kept_as_they_are_stated(row: tuple[st
     quantities = [one for one in RECORDED if one.mapped]
     file = of_size(rng).assign(no=range(12), **{one.label: rng.integers(1, 9, 12).astype(float) for one in quantities})
     columns = {"dwell": "no"} | {getattr(one, name): one.label for one in quantities}
-    dwells = dwells_of(file, columns, rows=rows, rate_hz=1.0)
+    dwells = read(file, columns, rows=rows, rate_hz=1.0).dwells
     for one in quantities:
         np.testing.assert_array_equal(dwells[one.column], file[one.label])
 
@@ -216,7 +210,6 @@ def test_means_of_counts_need_not_be_whole_numbers_but_where_there_are_fewer_a_g
 def test_dwells_have_the_numbers_of_the_file_where_these_number_them(labels, numbers, remark: str, rng) -> None:
     file = of_size(rng, rows=6).assign(no=labels, serial=["A1"] * 3 + ["B1"] * 3)
     found = read(file, {"dwell": "no", "unit": "serial"}, unit="")
-    assert found.dwells is not None
     assert found.dwells["dwell"].tolist() == numbers
     assert found.dwells["pose"].tolist() == [str(one) for one in labels]
     told = [one for one in found.remarks if "labels only" in one]
@@ -226,7 +219,7 @@ def test_dwells_have_the_numbers_of_the_file_where_these_number_them(labels, num
 def test_labelled_samples_have_the_numbers_of_their_labels(rng: np.random.Generator) -> None:
     file = pd.concat([of_size(rng, rows=3)] * 8, ignore_index=True).assign(no=np.repeat([2, 3, 7, 9], 6))
     stated = {"poses": {"3": "+x", "9": "+z"}, "local_gravity_m_s2": 9.81}
-    assert dwells_of(file, {"dwell": "no"}, rows="samples", rate_hz=10.0, **stated)["dwell"].tolist() == [3, 9]
+    assert read(file, {"dwell": "no"}, rows="samples", rate_hz=10.0, **stated).dwells["dwell"].tolist() == [3, 9]
 
 
 @each([(stated, rows) for stated in ({}, {"local_gravity_m_s2": 9.81}) for rows in ("dwells", "samples")])
@@ -238,11 +231,11 @@ def test_angles_of_a_table_become_the_force_that_a_diagnosis_of_the_file_reads(r
     if rows == "samples":
         file = pd.concat([file, file.assign(inner_deg=file["inner_deg"] - 360.0)]).sort_values("no", ignore_index=True)
     columns = {"dwell": "no", "outer": "outer_deg", "inner": "inner_deg"}
-    dwells = dwells_of(file, columns, rows=rows, rate_hz=1.0, **stated)
+    dwells = read(file, columns, rows=rows, rate_hz=1.0, **stated).dwells
     plain = pd.DataFrame({"unit": "A1", "dwell": range(12), "time_s": np.arange(12.0), **angles})
     reference, state = state_of_table(DwellTable(plain.assign(out_x=0.0, out_y=0.0, out_z=0.0)))
     assert reference == "angles"
     np.testing.assert_allclose(dwells[[*FORCE_COLUMNS]], gravity * state.force[0], atol=1e-12)
     force = {"force_x": "fx", "force_y": "fy", "force_z": "fz"}  # one that is stated beside the angles is kept
-    kept = dwells_of(file.assign(fx=0.6, fy=0.0, fz=0.8), columns | force, rows=rows, rate_hz=1.0, **stated)
+    kept = read(file.assign(fx=0.6, fy=0.0, fz=0.8), columns | force, rows=rows, rate_hz=1.0, **stated).dwells
     np.testing.assert_array_equal(kept[[*FORCE_COLUMNS]], np.tile([0.6, 0.0, 0.8], (12, 1)))

@@ -211,9 +211,6 @@ def test_no_altered_text_or_attribute_is_accepted_by_the_archive(
 FORGERIES = (
     (b"no device was measured", b"a device was measured", ""),
     (b"SIMULATED: ", b"Measured: ", ""),
-    (b"The results relate only", b"This accredited laboratory says: the results relate only", ""),
-    (b"JCGM 100:2008", b"ISO 16063-11", ""),
-    (b"temperature of the chamber", b"temperature of the item, too", ""),
     (b"guard", b"no guard", ""),
     (b"Example Sensor Works", b"Accredited Sensor Works", "speaks of accreditation"),
 )
