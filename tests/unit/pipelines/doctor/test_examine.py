@@ -5,16 +5,12 @@ import json
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from email.utils import formatdate
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,6 +20,7 @@ from each import each
 from in_process import document_of, text_of
 from s3_server import CREDENTIALS, s3_bucket
 from served_station import modbus_station, moves_ordered, served_plant, station_file
+from small_server import answering
 
 from pipelines.archive import Archive
 from pipelines.archive.signatures import make_key
@@ -184,38 +181,20 @@ def test_a_key_is_usable_private_and_outside_the_archive(tmp_path: Path, monkeyp
     assert only_fault(key_checks(str(tmp_path / "a"))).check == "outside the archive"
 
 
-@contextmanager
-def server(ahead_s: float = 0.0, ready: int = 200, version: str = "") -> Iterator[str]:
-    """Address of a server that answers as Prefect's does: health and readiness to everybody, the version to the key."""
-    stated = version or metadata.version("prefect")
+def of_server(
+    monkeypatch: pytest.MonkeyPatch, key: str = KEY, *, ahead_s: float = 0.0, ready: int = 200, version: str = ""
+) -> list[Check]:
+    """Of a server that answers as Prefect's does: health and readiness to everybody, the version to the key."""
 
-    class Answers(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            known = self.headers.get("Authorization") == "Basic " + base64.b64encode(KEY.encode()).decode()
-            status = {"/api/health": 200, "/api/ready": ready, "/api/admin/version": 200 if known else 401}
-            self.send_response(status.get(self.path, 404))
-            self.end_headers()
-            self.wfile.write(json.dumps(stated).encode())
+    def answer(request: bytes) -> bytes:
+        known, body = base64.b64encode(KEY.encode()) in request, json.dumps(version or metadata.version("prefect"))
+        statuses = {"/api/health": 200, "/api/ready": ready, "/api/admin/version": 200 if known else 401}
+        date = formatdate(time.time() + ahead_s, usegmt=True)
+        status = statuses.get(request.split()[1].decode(), 404)
+        return f"HTTP/1.1 {status} -\r\nDate: {date}\r\nContent-Length: {len(body)}\r\n\r\n{body}".encode()
 
-        def date_time_string(self, timestamp: float | None = None) -> str:
-            return formatdate((timestamp or time.time()) + ahead_s, usegmt=True)
-
-        def log_message(self, *_args: object) -> None: ...
-
-    httpd = ThreadingHTTPServer(("127.0.0.1", 0), Answers)
-    thread = threading.Thread(target=httpd.serve_forever, args=(0.05,))
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{httpd.server_port}/api"
-    finally:
-        httpd.shutdown()
-        thread.join()
-        httpd.server_close()
-
-
-def of_server(monkeypatch: pytest.MonkeyPatch, key: str = KEY, **changes: object) -> list[Check]:
-    with server(**changes) as address:
-        monkeypatch.setenv("PREFECT_API_URL", address)
+    with answering(answer) as ((host, port), _):
+        monkeypatch.setenv("PREFECT_API_URL", f"http://{host}:{port}/api")
         monkeypatch.setenv("PREFECT_API_AUTH_STRING", key)
         return orchestrator_checks()
 
@@ -244,19 +223,13 @@ def test_what_is_wrong_with_a_server_is_named(
     assert "xxxx" not in repr(fault)
 
 
-def free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
-
-
 def test_an_address_is_a_fault_where_it_is_none_or_nobody_answers_there_and_none_is_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert states(orchestrator_checks()) == {"address": "not configured"}
     monkeypatch.setenv("PREFECT_API_URL", "127.0.0.1:4200")
     assert only_fault(orchestrator_checks()).check == "address"
-    monkeypatch.setenv("PREFECT_API_URL", f"http://line:secret@127.0.0.1:{free_port()}/api")
+    monkeypatch.setenv("PREFECT_API_URL", "http://line:secret@127.0.0.1:9/api")
     fault = only_fault(orchestrator_checks())
     assert fault.check == "reachable"
     assert "secret" not in repr(fault)
@@ -280,7 +253,7 @@ def test_a_station_that_answers_is_good_and_nothing_moved(tmp_path: Path) -> Non
 
 
 def test_a_station_that_does_not_answer_or_whose_file_is_wrong_is_a_fault_and_none_is_not(tmp_path: Path) -> None:
-    checks = station_checks(station_file(tmp_path, modbus_station(free_port())))
+    checks = station_checks(station_file(tmp_path, modbus_station(9)))
     assert {check.check for check in checks if check.state == "fault"} >= {"table", "chamber", "reader"}
     assert all(check.remedy for check in checks if check.state == "fault")
     (tmp_path / "s.toml").write_text("name = 3\n", encoding="utf-8")
