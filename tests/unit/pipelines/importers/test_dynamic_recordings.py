@@ -13,7 +13,6 @@ from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 from schemas.errors import DataRejected, WrongUse
 
 RATE_HZ = 10_000.0
-COLUMNS = {"time": "1", "reference": "2", "z": "3"}  # as the printed command has them
 
 
 def second_order(x, natural_hz, damping, rate_hz):
@@ -50,7 +49,7 @@ def test_one_file_of_a_sweep_or_of_random_vibration_is_recognised_and_identified
     proposed = inspect([path]).document
     assert "--procedure sweep --map time=1,reference=2,z=3" in proposed["command"]
     assert proposed["open"] == []
-    layout = RecordingLayout(COLUMNS, {})
+    layout = RecordingLayout({"time": "1", "reference": "2", "z": "3"}, {})  # as the printed command has them
     document = import_waveforms([path], "sweep", None, "S1", layout, str(tmp_path / "archive"))
     figures = {one["figure"]: one for one in document["figures"]}
     for name, true in (("sweep_natural_hz", 800.0), ("sweep_damping", 0.6)):
@@ -60,17 +59,11 @@ def test_one_file_of_a_sweep_or_of_random_vibration_is_recognised_and_identified
     assert "no static scale and no nominal_scale" in figures["sweep_sensitivity_percent"]["note"]
 
 
-def half_sine(peak_g, duration_s, rng, rate_hz=50_000.0):
-    t = np.arange(int(0.2 * rate_hz)) / rate_hz
-    on = (t >= 0.05) & (t < 0.05 + duration_s)
-    return np.where(on, peak_g * np.sin(np.pi * (t - 0.05) / duration_s), 0.0) + 0.2 * rng.standard_normal(t.size)
-
-
-def shock_file(path, rng, peak_g=480.0, duration_s=1e-3, *, reference=True):
-    base = half_sine(peak_g, duration_s, rng)
-    frame = {"t [s]": np.arange(base.size) / 50_000.0, "dut [g]": second_order(base, 9000.0, 0.7, 50_000.0)}
-    if reference:
-        frame["ref [g]"] = base
+def shock_file(path, rng, duration_s=1e-3, *, rings=(9000.0, 0.7)):
+    t = np.arange(int(0.2 * 50_000.0)) / 50_000.0
+    pulse = 480.0 * np.sin(np.pi * (t - 0.05) / duration_s) * ((t >= 0.05) & (t < 0.05 + duration_s))
+    base = pulse + 0.2 * rng.standard_normal(t.size)
+    frame = {"t [s]": t, "dut [g]": second_order(base, *rings, 50_000.0), "ref [g]": base}
     pd.DataFrame(frame).to_csv(path, index=False, float_format="%.8g")
     return path
 
@@ -106,7 +99,7 @@ def test_a_drive_in_volts_that_steps_is_proposed_as_a_step_response(tmp_path, rn
 
 
 def test_a_sensor_alone_has_its_pulse_and_no_sensitivity_and_a_channel_that_no_test_reads_is_refused(tmp_path, rng):
-    path = shock_file(tmp_path / "alone.csv", rng, reference=False)
+    path = shock_file(tmp_path / "alone.csv", rng)
     document = shocked(path)
     figures = {one["figure"]: one for one in document["figures"]}
     assert figures["shock_peak_g"]["value"] == pytest.approx(480.0, rel=0.015)
@@ -116,11 +109,8 @@ def test_a_sensor_alone_has_its_pulse_and_no_sensitivity_and_a_channel_that_no_t
 
 
 def test_two_places_of_a_board_are_told_to_be_no_comparison(tmp_path, rng):
-    base = half_sine(480.0, 1e-3, rng)
-    far = second_order(base, 700.0, 0.05, 50_000.0)  # a board that rings at 700 Hz between the two
-    frame = {"t [s]": np.arange(base.size) / 50_000.0, "ref [g]": base, "dut [g]": far}
-    pd.DataFrame(frame).to_csv(tmp_path / "board.csv", index=False)
-    document = shocked(tmp_path / "board.csv", reference="ref [g]")
+    path = shock_file(tmp_path / "board.csv", rng, rings=(700.0, 0.05))  # between the two
+    document = shocked(path, reference="ref [g]")
     sensitivity = next(one for one in document["figures"] if one["figure"] == "shock_sensitivity_percent")
     assert not sensitivity["identified"]
     assert "two places of a structure are no comparison" in sensitivity["note"]
