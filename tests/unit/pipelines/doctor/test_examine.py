@@ -280,8 +280,6 @@ def test_this_environment_meets_the_requirements() -> None:
     checks = {check.check: check for check in software.software_checks()}
     assert checks["libraries"].state == "good"
     assert {checks[name].state for name in ("Python", "lock")} <= {"good", "warning"}
-    extras = set(metadata.metadata("tumbleline").get_all("Provides-Extra")) - software.DEVELOPMENT - {"recordings"}
-    assert all(extra in checks["optional parts"].found for extra in extras)
     assert "docs" not in checks["optional parts"].found  # builds the pages of the product, which its users read
 
 
