@@ -1,6 +1,7 @@
 """Text as devices write it: preambles, integer headers, decimal commas, byte-order marks, units in a line of their own."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -43,6 +44,11 @@ CASES = {
 def read(tmp_path: Path, text: str, encoding: str = "utf-8") -> Content:
     (tmp_path / "a.csv").write_bytes(text.encode(encoding))
     return files.read_content(tmp_path / "a.csv")[0]
+
+
+def inspected(tmp_path: Path, text: str) -> dict[str, Any]:
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    return inspect([tmp_path / "a.csv"]).document
 
 
 @each(CASES)
@@ -150,8 +156,7 @@ def test_words_that_lost_their_sign_are_refused_with_what_to_subtract(rng: np.ra
     wrong = table.assign(**{name: np.round(table[name]) % 65536.0 for name in ("ax", "ay", "az")})
     with pytest.raises(DataRejected, match=r"signed words of 16 bits .* subtract 65536"):
         imported(wrong, build(PLAIN, "t"), "a.csv")
-    wrong.to_csv(tmp_path / "a.csv", index=False)
-    assert any("without their sign" in one for one in inspect([tmp_path / "a.csv"]).document["open"])
+    assert any("without their sign" in one for one in inspected(tmp_path, wrong.to_csv(index=False))["open"])
 
 
 @each([(12, 2048, 400), (12, 2048, 2000), (16, 32768, 4000), (10, 512, 100)])
@@ -165,30 +170,25 @@ def test_a_converter_with_its_zero_in_the_middle_lost_no_sign(
 
 
 def test_a_sheet_of_positions_is_proposed_as_dwells(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("Position;X;Y;Z\nX up;0,98;0,01;0,02\nX down;-1,01;0,01;0,02\nY up;0,0;1,0;0,0\n")
-    document = inspect([tmp_path / "a.csv"]).document
+    document = inspected(tmp_path, "Position;X;Y;Z\nX up;0,98;0,01;0,02\nX down;-1,01;0,01;0,02\nY up;0,0;1,0;0,0\n")
     assert document["open"] == []
     assert "dwell=Position" in document["command"]
     assert document["command"].endswith("--set rows=dwells")
 
 
-@pytest.mark.parametrize(
-    ("heads", "mapped"),
-    [
-        (("a",), "x=a --unit-of output=UNIT,time=s --units S --set axes=x"),
-        (("acc_x", "acc_z"), "x=acc_x,z=acc_z --unit-of output=UNIT,time=s --units S --set axes=x,z"),
-        (("U_V", "sd_V"), "x=U_V --unit-of output=V,time=s --units S --set axes=x"),
-        (("temp", "az"), "temperature=temp,z=az --unit-of output=UNIT,time=s --units S --set axes=z"),
-    ],
-)
-def test_a_record_of_one_axis_or_two_is_proposed_by_its_columns(
-    heads: tuple[str, ...], mapped: str, tmp_path: Path, rng: np.random.Generator
-) -> None:
-    table = pd.DataFrame(rng.normal(1.0, 1e-3, (400, len(heads))), columns=list(heads))
-    table.insert(0, "time", 0.02 * np.arange(400))
-    table.to_csv(tmp_path / "S.csv", index=False)
-    document = inspect([tmp_path / "S.csv"]).document
-    assert document["command"].endswith(f"--map time=time,{mapped}")
+FEWER = {
+    "a": "x=a --unit-of output=UNIT,time=s --units a --set axes=x",
+    "acc_x acc_z": "x=acc_x,z=acc_z --unit-of output=UNIT,time=s --units a --set axes=x,z",
+    "U_V sd_V": "x=U_V --unit-of output=V,time=s --units a --set axes=x",
+    "temp az": "temperature=temp,z=az --unit-of output=UNIT,time=s --units a --set axes=z",
+}
+
+
+@each(FEWER)
+def test_a_record_of_one_axis_or_two_is_proposed_by_its_columns(heads: str, tmp_path: Path, rng) -> None:
+    table = pd.DataFrame(rng.normal(1.0, 1e-3, (400, len(heads.split()))), columns=heads.split())
+    document = inspected(tmp_path, table.assign(time=0.02 * np.arange(400)).to_csv(index=False))
+    assert document["command"].endswith(f"--map time=time,{FEWER[heads]}")
     assert any("fewer than three axes" in one and "--set axes" in one for one in document["open"])
     assert not any("were not recognised" in one for one in document["open"])
 
