@@ -80,14 +80,9 @@ def run(made: Run, tmp_path: Path) -> Run:
 
 
 @pytest.fixture
-def laboratory(tmp_path: Path) -> Path:
-    return laboratory_file(tmp_path)
-
-
-@pytest.fixture
-def typed(run: Run, laboratory: Path, tmp_path: Path) -> Typed:
+def typed(run: Run, tmp_path: Path) -> Typed:
     """The words of the command that writes certificates."""
-    own = ("--laboratory", laboratory, "--output", tmp_path / "out", "--archive", run.archive.root)
+    own = ("--laboratory", laboratory_file(tmp_path), "--output", tmp_path / "out", "--archive", run.archive.root)
     return lambda *words: ("certificate", "write", *words, *own)
 
 
@@ -323,8 +318,9 @@ def test_u_has_two_digits_and_the_value_ends_where_u_ends_in_certificate_and_rep
 
 
 def test_a_laboratory_file_with_a_slip_is_refused_and_one_that_says_accredited_without_an_accreditation_in_it(
-    laboratory: Path,
+    tmp_path: Path,
 ) -> None:
+    laboratory = tmp_path / "laboratory.toml"
     for old, new, why in (
         ('country = "DE"', 'country = "Germany"', r"laboratory\.country"),
         ("[customer]", "[costumer]", "unknown key 'costumer'"),
@@ -335,7 +331,7 @@ def test_a_laboratory_file_with_a_slip_is_refused_and_one_that_says_accredited_w
         with pytest.raises(RecipeInvalid, match=why):
             read_laboratory(laboratory)
     with pytest.raises(WrongUse, match=r"is not there, one with \[laboratory\]"):
-        read_laboratory(laboratory.parent / "none.toml")
+        read_laboratory(tmp_path / "none.toml")
     laboratory.write_text(LABORATORY.replace("Example Sensor Works", "Accredited Sensor Works"), encoding="utf-8")
     with pytest.raises(RecipeInvalid, match=r"laboratory.name: speaks of accreditation, \[laboratory.accreditation\]"):
         read_laboratory(laboratory)
