@@ -1,12 +1,10 @@
 """Parts of the audit on calibrations whose truth is known: charts, slots, gauge studies, intervals, strangers."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from calibration_rows import calibrations
 
-from pipelines.audit.calibrations import Calibrations, date_of, day_of
+from pipelines.audit.calibrations import Calibrations, day_of
 from pipelines.audit.drifts import kind_drifts
 from pipelines.audit.due import due
 from pipelines.audit.gauge_mounts import studies
@@ -91,18 +89,6 @@ def test_a_gauge_study_is_found_among_the_runs(rng):
     assert {(s.stations, s.gauge.parts, s.gauge.mounts) for s in all_} == {(("line-1", "line-2"), 10, 3)}
     assert np.median([s.gauge.repeatability for s in all_]) == pytest.approx(0.1, rel=0.15)
     assert np.median([s.gauge.reproducibility for s in all_]) == pytest.approx(0.3 / np.sqrt(2.0), rel=0.3)
-
-
-def test_fixed_intervals_count_calendar_months_from_the_last_pass(rng):
-    rows = [("A", "line-1", 0, 0.0), ("A", "line-1", 0, day_of("2022-08-31") - START), ("B", "line-1", 1, 30.0)]
-    histories = histories_of(rows, rng.standard_normal((3, len(NAMES))))
-    outcome = histories.outcome.copy()
-    outcome[2] = "fail"
-    histories = replace(histories, outcome=outcome)
-    rules = load_rules().model_copy(update={"interval_months": 6})
-    answer = due(histories, everything(histories), rules, [], {})
-    assert [date_of(day) for day in answer.day] == ["2023-02-28", date_of(START + 30.0)]
-    assert answer.because.tolist() == ["fixed", "did not pass"]
 
 
 def test_a_unit_that_drifts_is_due_earlier_when_drift_decides(rng):

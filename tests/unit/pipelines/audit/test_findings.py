@@ -82,10 +82,10 @@ def test_of_few_units_those_that_left_their_tolerance_are_found_by_their_uncerta
 
 
 def test_units_are_due_from_their_last_calibration_and_at_the_station_that_made_it() -> None:
-    start = day_of("2024-01-10")
+    start, half = day_of("2024-08-31"), RULES.model_copy(update={"interval_months": 6})
     all_ = of(("A", "X", "s", start), ("B", "X", "s", start), ("B", "X", "s", start + 20.0))
-    due_units = due(all_, np.ones(3, dtype=bool), RULES, [], {})
-    assert [date_of(day) for day in due_units.day] == ["2025-01-10", "2025-01-30"]
+    due_units = due(all_, np.ones(3, dtype=bool), half, [], {})
+    assert [date_of(day) for day in due_units.day] == ["2025-02-28", "2025-03-20"]  # by calendar months
     all_ = of(("A", "X", "s", start), ("A", "X", "t", start + 300.0), ("B", "X", "s", start))
     due_units = last_measured(all_, due(all_, np.ones(3, dtype=bool), RULES, [], {}), "s")
     assert [str(all_.unit[row]) for row in due_units.row] == ["B"]
