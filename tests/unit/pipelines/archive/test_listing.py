@@ -18,20 +18,12 @@ def archive(tmp_path: Path) -> Archive:
     """An archive of runs that were begun long ago, one of them finished."""
     store = Archive(tmp_path / "archive")
     for n in range(LOTS):
-        about = {
-            "station": {"name": "st-1"},
-            "recipe": {"name": "line"},
-            "lot": {"device": "ADXL355", "units": [{"serial": f"S{n}", "slot": 0}]},
-        }
-        run = store.open_run("line", about, n)
+        lot = {"device": "ADXL355", "units": [{"serial": f"S{n}", "slot": 0}]}
+        run = store.open_run("line", {"station": {"name": "st-1"}, "recipe": {"name": "line"}, "lot": lot}, n)
     (run.path / "report.html").write_text("")
     for path in (tmp_path / "archive" / "runs").iterdir():
-        long_ago(path)
+        os.utime(path, (time.time() - 100.0, time.time() - 100.0))
     return store
-
-
-def long_ago(folder: Path, seconds: float = 100.0) -> None:
-    os.utime(folder, (time.time() - seconds, time.time() - seconds))
 
 
 def test_the_list_is_read_again_without_the_runs_but_those_that_are_new_were_written_to_or_are_gone(
