@@ -63,7 +63,6 @@ def test_a_lot_ends_when_it_is_known_and_says_so() -> None:
 
 
 def test_dwells_on_a_ramp_keep_their_length() -> None:
-    """They decide how far the devices come on the way."""
     sink, ramp = MemorySink(), SoakPart(temperature_C=23.0, settled=False)
     captured(sink, MemoryLog(), looks(), RECIPE.model_copy(update={"soaks": [ramp], "static_record_s": 0.0}))
     lengths = {float(readings["duration_s"].iloc[0]) for _, readings, _ in sink.records.values()}
