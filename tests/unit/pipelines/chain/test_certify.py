@@ -158,10 +158,8 @@ def test_a_re_run_of_measurements_whose_certificate_was_revoked_is_certified_onl
     assert told in refusal(typed("certificate", "issue", rerun.id, "--units", "A1"))
     back = issued(typed, run.id, status=1)["left_out"]  # nor by the first run once more
     assert f"certificate A3/2 of run {rerun.id}, which has" in back["A3"]
-    (named,) = issued(typed, rerun.id, "--units", "A1", "--reason", "the model was wrong, the seat was not")[
-        "certified"
-    ]
-    assert named["certificate"] == "A1/3"
+    named = issued(typed, rerun.id, "--units", "A1", "--reason", "the model was wrong, the seat was not")
+    assert [one["certificate"] for one in named["certified"]] == ["A1/3"]
     known = Ledger(run.archive).calibrations("A1")
     assert compose(rerun, known[-1], known, NOBODY).amendment.replaces == ("A1/1",)
 
@@ -170,15 +168,14 @@ def test_certificates_are_listed_with_their_state_on_a_day(run: Run, typed: Type
     typed("certificate", "issue", run.id)
     typed("certificate", "revoke", "A2", "--reason", "cracked glass")
     listed = json.loads(typed("certificate", "list", "--json").stdout)["certificates"]
-    assert [(each["certificate"], each["state"]) for each in listed] == [
-        ("A1/1", "valid"), ("A2/1", "revoked"), ("A3/1", "valid"),
-    ]  # fmt: skip
+    states = {one["certificate"]: one["state"] for one in listed}
+    assert states == {"A1/1": "valid", "A2/1": "revoked", "A3/1": "valid"}
     holding = json.loads(typed("certificate", "list", "--at", day(), "--json").stdout)
     assert [each["serial"] for each in holding["certificates"]] == ["A1", "A3"]
     assert "no certificate valid on 2001-01-01" in typed("certificate", "list", "--at", "2001-01-01").stdout
     first = Ledger(run.archive).calibrations("A1")[0]
-    states = [first.state_on(at) for at in ("2001-01-01", first.start, first.until)]
-    assert states == ["begins later", "valid", "expired"]
+    assert first.state_on("2001-01-01") == "begins later"
+    assert (first.state_on(first.start), first.state_on(first.until)) == ("valid", "expired")
     assert "unit 'A9' has no certificate; known: A1, A2, A3" in refusal(typed("certificate", "list", "A9"))
 
 
@@ -250,7 +247,6 @@ def meanwhile(monkeypatch: pytest.MonkeyPatch, certified: Callable[[], object]) 
 def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """While one checks its run, the other certifies a run of the same units: the first is told, and writes nothing."""
     (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
     other = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(tmp_path / "half.toml"))).new)
     ledger = Ledger(run.archive)

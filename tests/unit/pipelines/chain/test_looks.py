@@ -81,7 +81,6 @@ def test_a_lot_that_knows_enough_ends(run: Run) -> None:
 
 
 def test_what_the_look_says_is_what_the_run_states(run: Run, tmp_path: Path) -> None:
-    """U of a look at all records is that of the run's budget, its guard apart: there is one estimate."""
     job, terms = job_of(tmp_path, 800.0), StopTerms(bias_ug=800.0)
     stated = run.table("uncertainties").query("quantity == 'bias'")["u"].max()
     guard = noise_guard(int(run.table("wander")["dof"].sum()), len(LotLooks(job, terms, run.records)._due))
