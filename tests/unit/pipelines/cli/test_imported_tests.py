@@ -15,9 +15,6 @@ from pipelines.archive import Archive
 RATE_HZ, SIZE = 50_000.0, 4000
 TIME = np.arange(SIZE) / RATE_HZ
 SCALE = 0.0072
-OF_SHOCK = ("--map", "time=time_s,z=DUT_V,reference=REF_g", "--unit-of", "output=V,reference=g", "--units", "SN1")
-OF_STEP = ("--map", "time=time_s,z=OUT_V,reference=DRIVE_V", "--unit-of", "output=V,reference=V", "--units", "SN1")
-NO_BIAS = "not measured: shock_bias_shift_ug: no record at rest before and after the shocks"
 
 
 def half_sine(peak_g: float = 30.0, begins_s: float = 0.02, duration_s: float = 0.006) -> np.ndarray:
@@ -30,31 +27,32 @@ def felt(force: np.ndarray, natural_hz: float = 1500.0, damping: float = 0.62) -
     return signal.lsim(([w**2], [1.0, 2.0 * damping * w, w**2]), force, TIME)[1]
 
 
-def shock(folder: Path, reference: np.ndarray, output: np.ndarray, *more: str, seed: int = 1) -> tuple[str, ...]:
-    """The words of the import of a shock with the noise of both channels."""
-    rng = np.random.default_rng(seed)
-    both = output + 2e-4 * rng.standard_normal(SIZE), reference + 0.02 * rng.standard_normal(SIZE)
-    path, part = folder / "shock.csv", folder / "shock.toml"
-    np.savetxt(path, np.c_[TIME, *both], fmt="%.9g", delimiter=",", header="time_s,DUT_V,REF_g", comments="")
-    part.write_text(f"scale = {SCALE}\n")
-    archive = ("--archive", str(folder / "archive"))
-    return ("import", str(path), "--procedure", "shock", "--set", str(part), *(more or OF_SHOCK), *archive)
+def recorded(
+    folder: Path, kind: str, reference: np.ndarray, output: np.ndarray, unit: str, noise: float, *more: str
+) -> tuple[str, ...]:
+    """The words of the import of a test with noise on both channels."""
+    rng, path = np.random.default_rng(1), folder / f"{kind}.csv"
+    both = output + 2e-4 * rng.standard_normal(SIZE), reference + noise * rng.standard_normal(SIZE)
+    np.savetxt(path, np.c_[TIME, *both], fmt="%.9g", delimiter=",", header="time_s,DUT_V,REF", comments="")
+    mapped = ("--map", "time=time_s,z=DUT_V,reference=REF", "--unit-of", f"output=V,reference={unit}")
+    archive = ("--units", "SN1", "--archive", str(folder / "archive"))
+    return ("import", str(path), "--procedure", kind, *more, *mapped, *archive)
+
+
+def shock(folder: Path, reference: np.ndarray, output: np.ndarray) -> tuple[str, ...]:
+    (folder / "part.toml").write_text(f"scale = {SCALE}\n")
+    return recorded(folder, "shock", reference, output, "g", 0.02, "--set", str(folder / "part.toml"))
 
 
 def step(folder: Path, drive: np.ndarray, output: np.ndarray) -> tuple[str, ...]:
-    """The words of the import of a step."""
-    rng = np.random.default_rng(2)
-    both = output + 2e-4 * rng.standard_normal(SIZE), drive + 0.002 * rng.standard_normal(SIZE)
-    path = folder / "step.csv"
-    np.savetxt(path, np.c_[TIME, *both], fmt="%.9g", delimiter=",", header="time_s,OUT_V,DRIVE_V", comments="")
-    return ("import", str(path), "--procedure", "step_response", *OF_STEP, "--archive", str(folder / "archive"))
+    return recorded(folder, "step_response", drive, output, "V", 0.002)
 
 
 def test_a_figure_that_a_file_cannot_hold_is_said_once_and_fails_nothing(tmp_path: Path) -> None:
     words = shock(tmp_path, half_sine(), SCALE * felt(half_sine()))
     text = text_of(*words, status=0)
     assert text.count("shock_bias_shift_ug") == 1
-    assert NO_BIAS in text
+    assert "not measured: shock_bias_shift_ug: no record at rest before and after the shocks" in text
     document = document_of(*words, status=0)
     assert document["verdict"] == "adequate"
     assert [one["figure"] for one in document["figures"] if not one["measured"]] == ["shock_bias_shift_ug"]
