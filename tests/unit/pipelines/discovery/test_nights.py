@@ -19,7 +19,9 @@ from inertial.discovery.running_sums import Levels, Scale
 from inertial.discovery.station_wander import Wander
 from inertial.frames import to_fixture
 from pipelines.archive import Archive, derived, files
+from pipelines.audit.parameters import NAMES
 from pipelines.demo.archive_lots import STATIONS, Line, write_lots, write_run
+from pipelines.discovery import coefficient_populations
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.discoveries import Discoveries, Discovery
@@ -238,9 +240,6 @@ def test_attributes_that_come_later_start_with_the_lots_after_them(archive: Arch
 def test_two_populations_in_a_coefficient_are_told_with_their_means(
     archive: Archive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pipelines.audit.parameters import NAMES
-    from pipelines.discovery import coefficient_populations
-
     units = 200
     values = np.random.default_rng(3).standard_normal((units, len(NAMES)))
     values[:30, NAMES.index("bias_y")] += 5.0
