@@ -32,6 +32,10 @@ def vector(kind: int, values: list, **attributes: list[str]) -> list[str]:
     return [*lines, str(END)] if attributes else lines
 
 
+def of_class(*names: str) -> dict[str, list[str]]:
+    return {"class": vector(TEXTS, [*names])}
+
+
 def frame() -> list[str]:
     """A data frame with a column of every kind that recordings have."""
     big = np.array([2**60 + 1, -3, np.iinfo(np.int64).min]).view(np.float64)
@@ -42,18 +46,12 @@ def frame() -> list[str]:
         "count": vector(INTEGER, [1, 2, 3]),
         "still": vector(LOGICAL, [1, 0, None]),
         "unit": vector(TEXTS, ["A1", None, "µ"]),
-        "pose": vector(
-            INTEGER, [2, 1, None], levels=vector(TEXTS, ["up", "down"]), **{"class": vector(TEXTS, ["factor"])}
-        ),
-        "when": vector(REAL, [1767225600.25, None, 1767225602.0], **{"class": vector(TEXTS, ["POSIXct", "POSIXt"])}),
-        "ticks": vector(REAL, [repr(float(one)) for one in big], **{"class": vector(TEXTS, ["integer64"])}),
+        "pose": vector(INTEGER, [2, 1, None], levels=vector(TEXTS, ["up", "down"]), **of_class("factor")),
+        "when": vector(REAL, [1767225600.25, None, 1767225602.0], **of_class("POSIXct", "POSIXt")),
+        "ticks": vector(REAL, [repr(float(one)) for one in big], **of_class("integer64")),
     }
-    attributes = {
-        "names": vector(TEXTS, list(columns)),
-        "class": vector(TEXTS, ["data.frame"]),
-        "row.names": vector(INTEGER, [None, -3]),
-    }
-    return vector(LIST, list(columns.values()), **attributes)
+    rows = {"row.names": vector(INTEGER, [None, -3])}
+    return vector(LIST, list(columns.values()), names=vector(TEXTS, list(columns)), **of_class("data.frame"), **rows)
 
 
 def saved(content: list[str], *, name: str = "") -> bytes:

@@ -251,7 +251,6 @@ def test_a_record_that_never_rests_has_no_stops_and_a_noisy_one_at_rest_has(rng:
 
 
 def test_files_that_follow_one_another_are_positions_of_their_own(rng: Rng, tmp_path: Path) -> None:
-    """A file for each face, without a move at its ends."""
     paths = []
     for k, force in enumerate(np.vstack([np.eye(3), -np.eye(3)])):
         outputs = three("ax[g] ay[g] az[g]", accelerations(rng, np.tile(force, (400, 1))))
