@@ -18,13 +18,7 @@ from each import each
 from numpy.typing import NDArray
 
 from pipelines.archive import Run
-from pipelines.export import (
-    ExportSettings,
-    UnitCalibration,
-    device_ids,
-    export_files,
-    unit_calibrations,
-)
+from pipelines.export import ExportSettings, UnitCalibration, device_ids, export_files, unit_calibrations
 from pipelines.export.fixed_point import fixed_point
 from pipelines.export.polynomials import ORDER, effects_left_out
 from pipelines.export.unit_noise import UnitNoise
