@@ -16,7 +16,6 @@ def calibrations(
     content = np.zeros((len(rows), len(NAMES))) if values is None else values
     usual = {"device": "ADXL355", "slot": 0, "outcome": "pass", "run": [f"{row[1]}-{row[2]:.3f}" for row in rows]}
     own = {name: np.broadcast_to(np.array(one, dtype=object), unit.shape) for name, one in (usual | more).items()}
-    days, slot = day.astype(float), own.pop("slot").astype(np.int64)
-    figures = {"values": content, "errors": np.full(content.shape, errors)}
-    made = Calibrations(unit=unit, station=station, day=days, slot=slot, **own, **figures)
+    days, slot, u = day.astype(float), own["slot"].astype(np.int64), np.full(content.shape, errors)
+    made = Calibrations(own["run"], unit, own["device"], station, slot, own["outcome"], days, content, u)
     return made.chosen(np.lexsort((days, own["device"].astype(str), unit.astype(str))))
