@@ -13,7 +13,7 @@ from pipelines.archive import Archive, files, packs
 from pipelines.archive.backup import copy_archive
 from pipelines.archive.compaction import compact
 from pipelines.archive.locks import alone
-from pipelines.archive.pack_writing import FolderToPack, merge_packs, write_pack
+from pipelines.archive.pack_writing import FolderToPack, due_of, merge_packs, write_pack
 from pipelines.audit.index import up_to_date
 from pipelines.audit.sql import ask
 from pipelines.certificates.ledger import Ledger
@@ -143,6 +143,16 @@ def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_pat
         folder = known.folder(name)
         assert folder.files["run.json"][1:] == (100 * number, 7, number)
     assert known.folder("runs/line-1") is None
+
+
+def test_many_compactions_leave_few_packs() -> None:
+    sizes: list[int] = []
+    for _ in range(40):
+        sizes.append(50_000)
+        due = due_of(sizes)
+        sizes[-due:] = [sum(sizes[-due:])]
+        assert len(sizes) <= 10
+    assert len(sizes) < 8
 
 
 def test_merging_keeps_the_newer_of_two_files_wherever_it_is_packed(archive: Archive) -> None:
