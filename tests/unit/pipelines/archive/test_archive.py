@@ -56,19 +56,10 @@ def test_a_manifest_says_from_what_and_with_what_its_key_depends_on_that_and_a_f
 ) -> None:
     manifest = run.manifest("coefficients")
     assert manifest["inputs"] == {name: run.manifest(name)["sha256"] for name in ("dwells", "history")}
-    assert manifest["parameters"]["effects"][0] == "bias"
     assert {"who", "where", "when", "libraries", "code", "schema"} <= manifest.keys()
-    keys = [
-        stage_key("fit", {"dwells": dwells}, {"effects": [effect]}, code)
-        for dwells, effect, code in (
-            ("1", "bias", "code"),
-            ("2", "bias", "code"),
-            ("1", "scale", "code"),
-            ("1", "bias", "new"),
-        )
-    ]
-    assert len(set(keys)) == 4
-    assert stage_key("fit", {"dwells": "1"}, {"effects": ["bias"]}, "code") == keys[0]
+    changes = [(dwells, effect, code) for dwells in "12" for effect in ("bias", "scale") for code in ("code", "new")]
+    keys = [stage_key("fit", {"dwells": one[0]}, {"effects": [one[1]]}, one[2]) for one in changes * 2]
+    assert len(set(keys)) == len(changes)
     job = small_job(tmp_path)
     again = Runner(job, run.archive, measure=_never)
     assert again.run.id == run.id
@@ -119,21 +110,15 @@ def test_one_process_at_a_time_measures_a_lot(tmp_path: Path) -> None:
 
 
 def test_a_key_takes_in_the_sources_of_what_its_stage_uses_and_imports_none_of_them() -> None:
-    assert not {n for n in sources(CODE["grade"]) if n.startswith("inertial.criticism")}
-    assert "inertial.fits.wander" not in sources(CODE["reduce"])
     assert {"inertial.effects.third_order", "inertial.effects.covariate"} <= set(sources(CODE["fit"]))
-    assert "pipelines.procedures.sweep" in sources(CODE["procedures"])
     assert {"inertial.noise.allan", "inertial.noise"} <= set(sources(("inertial.noise",)))
-    assert list(sources(CODE["fit"])) == sorted(sources(CODE["fit"]))
     for name in ("inertial.no_such_module", "no_such_package", "inertial.counts.number_of"):
         with pytest.raises(LookupError, match=name):
             sources((name,))
     found = sources(("inertial", "schemas", "stations", "pipelines"))
     assert len(found) > 900
     for name in [*found][::9]:
-        spec = find_spec(name)
-        assert spec is not None, name
-        assert found[name] == Path(spec.origin or ""), name
+        assert found[name] == Path(find_spec(name).origin), name
     code = (
         "import sys; from pipelines.archive.keys import code_hash; before = set(sys.modules); "
         "code_hash('report'); print(*(set(sys.modules) - before))"

@@ -18,20 +18,12 @@ def archive(tmp_path: Path) -> Archive:
     """An archive of runs that were begun long ago, one of them finished."""
     store = Archive(tmp_path / "archive")
     for n in range(LOTS):
-        about = {
-            "station": {"name": "st-1"},
-            "recipe": {"name": "line"},
-            "lot": {"device": "ADXL355", "units": [{"serial": f"S{n}", "slot": 0}]},
-        }
-        run = store.open_run("line", about, n)
+        lot = {"device": "ADXL355", "units": [{"serial": f"S{n}", "slot": 0}]}
+        run = store.open_run("line", {"station": {"name": "st-1"}, "recipe": {"name": "line"}, "lot": lot}, n)
     (run.path / "report.html").write_text("")
     for path in (tmp_path / "archive" / "runs").iterdir():
-        long_ago(path)
+        os.utime(path, (time.time() - 100.0, time.time() - 100.0))
     return store
-
-
-def long_ago(folder: Path, seconds: float = 100.0) -> None:
-    os.utime(folder, (time.time() - seconds, time.time() - seconds))
 
 
 def test_the_list_is_read_again_without_the_runs_but_those_that_are_new_were_written_to_or_are_gone(
@@ -66,7 +58,6 @@ def test_a_line_of_an_older_version_is_read_again_and_is_no_edit(archive: Archiv
     files.publish(place, files.json_bytes({"runs": older, "seal": derived.seal({"runs": digest(older)})}))
     name, (_, line) = next(iter(older.items()))
     info = listing.info_of(Run(archive, name))
-    assert info is not None
     assert listing.agrees(info, line)
     assert not listing.agrees(info, [*line[:2], "another device", *line[3:]])
     assert all(info.station == "st-1" for info in archive.runs())  # not in the older lines

@@ -40,11 +40,9 @@ def test_a_record_in_pieces_has_the_samples_of_one_in_a_piece(monkeypatch: pytes
     pieces = captured(recipe, MemorySink())
     assert len(pieces.ahead) == 4
     assert max(len(piece) for piece in pieces.ahead) < 8000
-    order = ["record", "unit", "time_s"]
     for part in range(3):
-        left, right = (
-            sink.all(part).sort_values([c for c in order if c in sink.all(part)]) for sink in (whole, pieces)
-        )
+        known = [name for name in ("record", "unit", "time_s") if name in whole.all(part)]
+        left, right = (sink.all(part).sort_values(known) for sink in (whole, pieces))
         pd.testing.assert_frame_equal(left.reset_index(drop=True), right.reset_index(drop=True), check_exact=True)
     assert pieces.all(1)["n"].tolist()[-2:] == [12000, 12000]
 
@@ -65,7 +63,6 @@ def test_pieces_are_published_with_their_record_or_not_at_all(tmp_path: Path) ->
     assert records.finished() == {0}
     pd.testing.assert_frame_equal(pd.concat(records.samples(), ignore_index=True), samples)
     assert [len(piece) for piece in records.samples()] == [100, 100, 100]
-    assert len(records.gathered("samples")) == len(samples)
 
 
 def test_pieces_of_a_killed_or_spoilt_attempt_do_not_reach_the_next(tmp_path: Path) -> None:
@@ -99,13 +96,10 @@ def cut(tables: list[pd.DataFrame], cuts: int) -> Iterator[pd.DataFrame]:
             yield table[(table["time_s"] > low) & (table["time_s"] <= high)].reset_index(drop=True)
 
 
-@pytest.mark.parametrize(
-    ("fault", "cuts"),
-    mostly_slow(
-        [*((f, 7) for f in ("", "stuck", "nan", "infinity", "clipped", "short", "overflow")), ("", 2)],
-        *[("nan", 7)],
-    ),
-)
+CUTS = [*((fault, 7) for fault in ("", "stuck", "nan", "infinity", "clipped", "short", "overflow")), ("", 2)]
+
+
+@pytest.mark.parametrize(("fault", "cuts"), mostly_slow(CUTS, ("nan", 7)))
 def test_pieces_are_judged_as_the_whole_is(tmp_path: Path, fault: str, cuts: int) -> None:
     samples, readings = lot_in_memory(tmp_path, {"A2": fault} if fault else {})
     assert [(n, len(list(own))) for n, own in by_record(cut(samples, cuts))] == [(n, cuts) for n in range(10)]
@@ -123,17 +117,17 @@ def test_pieces_are_judged_as_the_whole_is(tmp_path: Path, fault: str, cuts: int
 def test_a_long_series_is_averaged_and_keeps_its_allan_deviation(rng: np.random.Generator) -> None:
     n, size = 40000, 8
     values = rng.normal(size=(n, 3)) + np.cumsum(0.001 * rng.normal(size=(n, 3)), axis=0)
-    tables = [pd.DataFrame({"unit": "U", "x": v[:, 0], "y": v[:, 1], "z": v[:, 2]}) for v in np.array_split(values, 13)]
-    series = noise_stage.StaticSeries(["U"], size)
-    for table in tables:
-        series.add(table)
-    assert series.of("U").shape == (n // size, 3)
-    whole, means = overlapping(values.T, 100.0), overlapping(series.of("U").T, 100.0 / size)
+
+    def series(size: int) -> np.ndarray:
+        made = noise_stage.StaticSeries(["U"], size)
+        for part in np.array_split(values, 13):
+            made.add(pd.DataFrame(part, columns=["x", "y", "z"]).assign(unit="U"))
+        return made.of("U")
+
+    assert series(size).shape == (n // size, 3)
+    whole, means = overlapping(values.T, 100.0), overlapping(series(size).T, 100.0 / size)
     shared = np.isin(np.round(whole.tau, 9), np.round(means.tau, 9))
     ratio = means.deviation[:, : shared.sum()] / whole.deviation[:, shared]
     assert means.tau[0] == pytest.approx(size / 100.0)
     assert ratio[:, :6] == pytest.approx(1.0, abs=0.05)  # the same record with less overlap
-    kept = noise_stage.StaticSeries(["U"], 1)
-    for table in tables:
-        kept.add(table)
-    assert np.array_equal(kept.of("U"), values)
+    assert np.array_equal(series(1), values)

@@ -1,11 +1,10 @@
 """Parts of the audit on calibrations whose truth is known: charts, slots, gauge studies, intervals, strangers."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from calibration_rows import calibrations
 
-from pipelines.audit.calibrations import Calibrations, date_of, day_of
+from pipelines.audit.calibrations import Calibrations, day_of
 from pipelines.audit.drifts import kind_drifts
 from pipelines.audit.due import due
 from pipelines.audit.gauge_mounts import studies
@@ -19,17 +18,10 @@ START = day_of("2022-01-03")
 ERROR = 0.02
 
 
-def calibrations(rows: list[tuple], values: np.ndarray) -> Calibrations:
-    """Calibrations from (unit, station, slot, day after the start) and parameters (n, p); every run is a day on a station."""
-    unit, station, slot, day = (np.array(column, dtype=object) for column in zip(*rows, strict=True))
-    order = np.lexsort((day.astype(float), unit.astype(str)))
-    days = START + day.astype(float)
-    run = np.array([f"{s}-{d:.3f}" for s, d in zip(station, day.astype(float), strict=True)], dtype=object)
-    same = np.full(len(rows), "ADXL355", dtype=object), np.full(len(rows), "pass", dtype=object)
-    unsorted = Calibrations(
-        run, unit, same[0], station, slot.astype(np.int64), same[1], days, values, np.full(values.shape, ERROR)
-    )
-    return unsorted.chosen(order)
+def histories_of(rows: list[tuple], values: np.ndarray) -> Calibrations:
+    """Calibrations of (unit, station, slot, day after the start); every run is a day on a station."""
+    days = [(unit, station, START + day) for unit, station, _, day in rows]
+    return calibrations(days, values, slot=[row[2] for row in rows], errors=ERROR)
 
 
 def units_again(rng: np.random.Generator, units: int = 60, times: int = 6, spread: float = 1.0):
@@ -60,7 +52,7 @@ def test_a_check_standard_that_moves_is_out_of_control_and_one_that_stands_is_no
             values.append(rng.standard_normal(len(NAMES)))
             if station == "line-2" and week >= 100:
                 values[-1][NAMES.index("bias_x")] += 2.0
-    control_charts = charts(calibrations(rows, np.array(values)), load_rules(), START)
+    control_charts = charts(histories_of(rows, np.array(values)), load_rules(), START)
     out = [(chart.station, chart.parameter) for chart in control_charts if not chart.in_control]
     assert out == [("line-2", "bias_x")]
     chart = next(c for c in control_charts if c.station == "line-2" and c.parameter == "bias_x")
@@ -75,7 +67,7 @@ def test_a_slot_that_is_knocked_is_told_with_its_day(rng):
     for k, (_, station, slot, day) in enumerate(rows):
         if (station, slot) == ("line-2", 1) and day >= 700.0:
             values[k, turn] += 1.0
-    histories = calibrations(rows, values)
+    histories = histories_of(rows, values)
     series, means = slot_series(histories, everything(histories))
     moved = [(s.station, s.where, s.parameter) for s in series if s.changes]
     assert moved == [("line-2", "slot 1", "rotation_z")]
@@ -92,23 +84,11 @@ def test_a_gauge_study_is_found_among_the_runs(rng):
             for part in range(10):
                 rows.append((f"G{part}", station, part % 4, 500.0 + mount + 0.5 * (station == "line-2")))
                 values = np.vstack([values, own[part] + offset + 0.1 * rng.standard_normal(len(NAMES))])
-    histories = calibrations(rows, values)
+    histories = histories_of(rows, values)
     all_ = studies(histories, everything(histories), load_rules())
     assert {(s.stations, s.gauge.parts, s.gauge.mounts) for s in all_} == {(("line-1", "line-2"), 10, 3)}
     assert np.median([s.gauge.repeatability for s in all_]) == pytest.approx(0.1, rel=0.15)
     assert np.median([s.gauge.reproducibility for s in all_]) == pytest.approx(0.3 / np.sqrt(2.0), rel=0.3)
-
-
-def test_fixed_intervals_count_calendar_months_from_the_last_pass(rng):
-    rows = [("A", "line-1", 0, 0.0), ("A", "line-1", 0, day_of("2022-08-31") - START), ("B", "line-1", 1, 30.0)]
-    histories = calibrations(rows, rng.standard_normal((3, len(NAMES))))
-    outcome = histories.outcome.copy()
-    outcome[2] = "fail"
-    histories = replace(histories, outcome=outcome)
-    rules = load_rules().model_copy(update={"interval_months": 6})
-    answer = due(histories, everything(histories), rules, [], {})
-    assert [date_of(day) for day in answer.day] == ["2023-02-28", date_of(START + 30.0)]
-    assert answer.because.tolist() == ["fixed", "did not pass"]
 
 
 def test_a_unit_that_drifts_is_due_earlier_when_drift_decides(rng):
@@ -118,7 +98,7 @@ def test_a_unit_that_drifts_is_due_earlier_when_drift_decides(rng):
     for k, (unit, *_, day) in enumerate(rows):
         if unit == "U007":
             values[k, bias] += 1500.0 * day / 365.25
-    histories = calibrations(rows, values)
+    histories = histories_of(rows, values)
     rules = load_rules().model_copy(update={"interval": "drift"})
     kinds = kind_drifts(histories, everything(histories), rules, START)
     units = unit_drifts(histories, everything(histories), kinds, rules, {("ADXL355", "bias"): 20000.0})
@@ -140,9 +120,9 @@ def test_a_lot_that_stands_out_is_told_once_and_not_unit_by_unit(rng):
             rows.append((f"L{lot:02d}-{place}", "line-1", place, float(lot)))
             values.append(rng.standard_normal(len(NAMES)) + (6.0 if lot == 33 else 0.0))
     values[205][NAMES.index("scale_y")] = 15.0
-    histories = calibrations(rows, np.array(values))
+    histories = histories_of(rows, np.array(values))
     odd = odd_ones(histories, everything(histories))
-    assert [(one.kind, one.name) for one in odd] == [("lot", "line-1-33.000"), ("unit", "L20-5")]
+    assert [(one.kind, one.name) for one in odd] == [("lot", f"line-1-{START + 33.0:.3f}"), ("unit", "L20-5")]
     assert next(one for one in yields(histories, everything(histories)) if one.of == "all").passed == 600
 
 

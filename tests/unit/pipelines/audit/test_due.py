@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from calibration_rows import calibrations
 from each import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +14,6 @@ from ledger_events import event
 from benchmarks.generated_ledger import write_events
 from pipelines.audit.calibrations import Calibrations, date_of, day_of
 from pipelines.audit.due import Certificates, certificates_of, due, uncertified
-from pipelines.audit.parameters import NAMES
 from pipelines.audit.rules import load_rules
 from pipelines.certificates import Ledger, LedgerEntry
 from schemas.errors import WrongUse
@@ -25,13 +25,9 @@ RULES = load_rules()
 
 def measured(*rows: tuple[str, str, str], outcome: str = "pass") -> Calibrations:
     """Calibrations of (unit, run, day); the last one of all has the outcome."""
-    unit, run, day = (np.array(column, dtype=object) for column in zip(*rows, strict=True))
-    n = len(rows)
-    kind, station = np.full(n, "ADXL355", dtype=object), np.full(n, "bench", dtype=object)
-    outcomes = np.array(["pass"] * (n - 1) + [outcome], dtype=object)
-    days = np.array([day_of(str(one)) for one in day])
-    values = np.zeros((n, len(NAMES)))
-    return Calibrations(run, unit, kind, station, np.zeros(n, dtype=np.int64), outcomes, days, values, values + 1.0)
+    days = [(unit, "bench", day_of(day)) for unit, _, day in rows]
+    outcomes = ["pass"] * (len(rows) - 1) + [outcome]
+    return calibrations(days, run=[row[1] for row in rows], outcome=outcomes, errors=1.0)
 
 
 def known(root: Path, *events: LedgerEntry, captures: dict[str, str] | None = None) -> Certificates:
@@ -88,8 +84,8 @@ def test_what_passed_and_was_not_certified_is_told_and_due_by_its_interval(tmp_p
     due_units = due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger)
     assert [str(all_.unit[due_units.row[k]]) for k in uncertified(all_, due_units, ledger)] == ["A1"]
     assert (date_of(due_units.day[0]), due_units.because[0], due_units.valid[0]) == ("2027-02-01", "fixed", False)
-    newer, older = measured(("A1", "r-1", "2025-07-31"), ("A1", "r-2", "2026-06-01")), tmp_path / "older"
-    ledger = known(older, event(start="2025-08-01", until="2026-08-01"))
+    newer = measured(("A1", "r-1", "2025-07-31"), ("A1", "r-2", "2026-06-01"))
+    ledger = known(tmp_path / "older", event(start="2025-08-01", until="2026-08-01"))
     assert uncertified(newer, due(newer, np.ones(2, dtype=bool), RULES, [], {}, ledger), ledger).size == 1
     one, ledger = measured(FIRST), known(tmp_path / "none")  # without a ledger nothing is told
     assert uncertified(one, due(one, np.ones(1, dtype=bool), RULES, [], {}, ledger), ledger).size == 0
@@ -113,8 +109,8 @@ MONTH = st.integers(1, 12).map(lambda month: f"2026-{month:02d}-01")
 
 
 @settings(max_examples=40, deadline=None)
-@given(st.lists(st.tuples(st.sampled_from(["certify", "supersede", "revoke"]), MONTH, MONTH), max_size=6), MONTH)
-def test_whether_a_certificate_holds_is_what_the_ledger_says_on_that_day(
+@given(st.lists(st.tuples(st.sampled_from(["certify", "supersede", "revoke"]), MONTH, MONTH), max_size=8), MONTH)
+def test_one_certificate_holds_on_a_day_and_it_is_the_one_that_the_ledger_says(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[str, str, str]], day: str
 ) -> None:
     root = tmp_path_factory.mktemp("ledger")
@@ -128,6 +124,8 @@ def test_whether_a_certificate_holds_is_what_the_ledger_says_on_that_day(
                 ledger.add(event(run=f"r-{number}", start=start, until=until), supersede=action == "supersede")
         except WrongUse:
             continue
+    for month in range(1, 13):
+        assert sum(one.holds(f"2026-{month:02d}-01") for one in ledger.calibrations("A1")) <= 1
     everything = certificates_of(root, day_of("2100-01-01"), {})
     certificates = Certificates(day, everything.of, {}, {})
     standing = certificates.standing("ADXL355", "A1", "r-0")

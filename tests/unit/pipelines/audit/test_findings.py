@@ -10,6 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from calibration_rows import calibrations
 from root_process import ROOT
 
 sys.path.insert(0, str(ROOT))
@@ -31,27 +32,18 @@ from pipelines.audit.unit_findings import of_small_kinds, twice
 RULES = load_rules()
 
 
-def calibrations(*rows: tuple[str, str, str, float], values: np.ndarray | None = None) -> Calibrations:
-    """Calibrations of (unit, device, station, day), in the audit's order; a run is a station on a day."""
-    unit, device, station, day = (np.array(column, dtype=object) for column in zip(*rows, strict=True))
-    order = np.lexsort((day.astype(float), device.astype(str), unit.astype(str)))
-    n = len(rows)
-    run = np.array([f"{s}-{d}" for s, d in zip(station, day, strict=True)], dtype=object)
-    content = np.zeros((n, len(NAMES))) if values is None else values
-    unsorted = Calibrations(
-        run, unit, device, station, np.zeros(n, dtype=np.int64), np.full(n, "pass", dtype=object), day.astype(float),
-        content, np.full(content.shape, 0.01),
-    )  # fmt: skip
-    return unsorted.chosen(order)
+def of(*rows: tuple[str, str, str, float], values: np.ndarray | None = None) -> Calibrations:
+    """Calibrations of (unit, device, station, day); a run is a station on a day."""
+    return calibrations([(row[0], *row[2:]) for row in rows], values, device=[row[1] for row in rows])
 
 
 def test_one_serial_on_two_kinds_or_stations_within_minutes_is_two_units_and_on_the_next_day_one() -> None:
-    kinds = calibrations(("A", "ADXL355", "s", 0.0), ("A", "SF1500", "s", 90.0), ("B", "ADXL355", "s", 0.0))
+    kinds = of(("A", "ADXL355", "s", 0.0), ("A", "SF1500", "s", 90.0), ("B", "ADXL355", "s", 0.0))
     assert list(twice(kinds)) == ["A"]
-    assert twice(calibrations(("A", "ADXL355", "s", 0.0), ("A", IMPORTED, "s", 90.0))) == {}  # which states no device
-    at_once = calibrations(("A", "X", "s", 10.0), ("A", "X", "t", 10.002), ("B", "X", "s", 10.0), ("B", "X", "t", 11.0))
+    assert twice(of(("A", "ADXL355", "s", 0.0), ("A", IMPORTED, "s", 90.0))) == {}  # which states no device
+    at_once = of(("A", "X", "s", 10.0), ("A", "X", "t", 10.002), ("B", "X", "s", 10.0), ("B", "X", "t", 11.0))
     assert list(twice(at_once)) == ["A"]
-    again = calibrations(("A", "X", "s", 10.0), ("A", "X", "s", 10.002))  # the same station began once more
+    again = of(("A", "X", "s", 10.0), ("A", "X", "s", 10.002))  # the same station began once more
     assert twice(again) == {}
 
 
@@ -67,12 +59,12 @@ def test_exchanged_serials_are_told_among_four_units_and_no_change_of_a_unit_is(
     own = 5000.0 * rng.standard_normal((4, len(NAMES)))
     values = np.repeat(own, 2, axis=0) + 0.1 * rng.standard_normal((8, len(NAMES)))
     values[[1, 5]] = values[[5, 1]]  # A and C on the second day
-    strange = strangers(calibrations(*rows, values=values), RULES)
+    strange = strangers(of(*rows, values=values), RULES)
     assert [(one.row, one.looks_like, one.exchanged) for one in strange] == [(1, "C", True), (5, "A", True)]
     values = np.repeat(5000.0 * rng.standard_normal((4, len(NAMES))), 2, axis=0)
     values[1] += 9000.0
     values[5] -= 9000.0
-    assert strangers(calibrations(*rows, values=values), RULES) == []
+    assert strangers(of(*rows, values=values), RULES) == []
 
 
 def test_of_few_units_those_that_left_their_tolerance_are_found_by_their_uncertainty(rng: np.random.Generator) -> None:
@@ -82,7 +74,7 @@ def test_of_few_units_those_that_left_their_tolerance_are_found_by_their_uncerta
     values[1, bias] += 1600.0  # A: tolerance 1500 µg
     values[3, bias] += 1400.0
     values[5, scale] -= 1020.0  # C: tolerance 1000 ppm, but U is 40 ppm
-    moved = calibrations(*rows, values=values)
+    moved = of(*rows, values=values)
     errors = np.where(np.arange(len(NAMES)) == scale, 14.2, moved.errors)
     found = of_small_kinds(replace(moved, errors=errors), np.ones(8, dtype=bool), RULES, (), 0.0)
     assert [(one.kind, one.units, one.evidence["parameter"]) for one in found] == [("found_outside", ("A",), "bias_x")]
@@ -90,11 +82,11 @@ def test_of_few_units_those_that_left_their_tolerance_are_found_by_their_uncerta
 
 
 def test_units_are_due_from_their_last_calibration_and_at_the_station_that_made_it() -> None:
-    start = day_of("2024-01-10")
-    all_ = calibrations(("A", "X", "s", start), ("B", "X", "s", start), ("B", "X", "s", start + 20.0))
-    due_units = due(all_, np.ones(3, dtype=bool), RULES, [], {})
-    assert [date_of(day) for day in due_units.day] == ["2025-01-10", "2025-01-30"]
-    all_ = calibrations(("A", "X", "s", start), ("A", "X", "t", start + 300.0), ("B", "X", "s", start))
+    start, half = day_of("2024-08-31"), RULES.model_copy(update={"interval_months": 6})
+    all_ = of(("A", "X", "s", start), ("B", "X", "s", start), ("B", "X", "s", start + 20.0))
+    due_units = due(all_, np.ones(3, dtype=bool), half, [], {})
+    assert [date_of(day) for day in due_units.day] == ["2025-02-28", "2025-03-20"]  # by calendar months
+    all_ = of(("A", "X", "s", start), ("A", "X", "t", start + 300.0), ("B", "X", "s", start))
     due_units = last_measured(all_, due(all_, np.ones(3, dtype=bool), RULES, [], {}), "s")
     assert [str(all_.unit[row]) for row in due_units.row] == ["B"]
 

@@ -57,13 +57,11 @@ def test_an_opened_door_pauses_and_repeated_dwells_are_in_the_result_on_the_repo
     assert "measured again 2 times" in shown
 
 
-def test_a_run_without_any_says_so_and_one_that_did_not_note_them_says_that(run: Run) -> None:
+def test_a_run_without_any_says_so_and_one_that_did_not_note_them_says_that(run: Run, monkeypatch) -> None:
     table = Run.table
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Run, "table", lambda one, name: table(one, name).iloc[: 0 if name == "events" else None])
-        none = {"door_opened": 0, "pauses": 0, "paused_s": 0.0, "repeated_dwells": [], "events": []}
-        assert interruptions(run) == none
-        assert "nothing paused the run" in render(run)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Run, "tables", lambda _self: ["grades"])
-        assert interruptions(run) is None
+    monkeypatch.setattr(Run, "table", lambda one, name: table(one, name).iloc[: 0 if name == "events" else None])
+    none = {"door_opened": 0, "pauses": 0, "paused_s": 0.0, "repeated_dwells": [], "events": []}
+    assert interruptions(run) == none
+    assert "nothing paused the run" in render(run)
+    monkeypatch.setattr(Run, "tables", lambda _self: ["grades"])
+    assert interruptions(run) is None

@@ -1,5 +1,7 @@
 """A capture that looks at its records: it ends where the look says so, and a resumed one asks nothing again."""
 
+from dataclasses import replace
+
 import pytest
 from long_suites import mostly_slow
 from small_station import MemorySink, lot_of, short_recipe
@@ -21,9 +23,8 @@ RECIPE = short_recipe(poses=5, static_s=3.0, temperatures=(23.0,)).model_copy(
 class Told:
     """Looks that are given: after which record, and what they say."""
 
-    def __init__(self, **looks: Look) -> None:
-        self.looks = {int(name[1:]): look for name, look in looks.items()}
-        self.asked: list[int] = []
+    def __init__(self, looks: dict[int, Look]) -> None:
+        self.looks, self.asked = looks, list[int]()
 
     def due(self, record: int) -> bool:
         return record in self.looks
@@ -31,9 +32,7 @@ class Told:
     def look(self, record: int, reported: frozenset[str]) -> Look:
         self.asked.append(record)
         own = self.looks[record]
-        return Look(
-            own.known, own.text, {u: f for u, f in own.fails.items() if u not in reported}, own.given_up, own.dwell_s
-        )
+        return replace(own, fails={unit: text for unit, text in own.fails.items() if unit not in reported})
 
 
 def captured(sink: MemorySink, events: MemoryLog, looks: Told, recipe: Recipe = RECIPE) -> None:
@@ -43,10 +42,8 @@ def captured(sink: MemorySink, events: MemoryLog, looks: Told, recipe: Recipe = 
 
 def looks() -> Told:
     fails = {"U001": "zero_g_offset_mg 160 ± 2 mg, limit 150 mg"}
-    return Told(
-        r1=Look(known=False, text="1 of 2 units decided", fails=fails, dwell_s=1.0),
-        r2=Look(known=True, text="2 of 2 units decided", fails=fails, given_up=("third_order",)),
-    )
+    first = Look(known=False, text="1 of 2 units decided", fails=fails, dwell_s=1.0)
+    return Told({1: first, 2: Look(known=True, text="2 of 2 units decided", fails=fails, given_up=("third_order",))})
 
 
 def test_a_lot_ends_when_it_is_known_and_says_so() -> None:
@@ -56,9 +53,7 @@ def test_a_lot_ends_when_it_is_known_and_says_so() -> None:
     assert kinds == ["dwell"] * 3 + ["verification", "allan"]
     lengths = [float(readings["duration_s"].iloc[0]) for _, readings, _ in sink.records.values()]
     assert lengths == [2.0, 2.0, 1.0, 2.0, 3.0]
-    told = [
-        (event.kind, event.record, event.action) for event in events.events if event.kind not in ("soak", "reference")
-    ]
+    told = [(one.kind, one.record, one.action) for one in events.events if one.kind not in ("soak", "reference")]
     assert told == [
         ("fails", 1, "unit U001 fails already, the others go on"),
         ("look", 1, "the lot goes on"),
@@ -68,7 +63,6 @@ def test_a_lot_ends_when_it_is_known_and_says_so() -> None:
 
 
 def test_dwells_on_a_ramp_keep_their_length() -> None:
-    """They decide how far the devices come on the way."""
     sink, ramp = MemorySink(), SoakPart(temperature_C=23.0, settled=False)
     captured(sink, MemoryLog(), looks(), RECIPE.model_copy(update={"soaks": [ramp], "static_record_s": 0.0}))
     lengths = {float(readings["duration_s"].iloc[0]) for _, readings, _ in sink.records.values()}
@@ -83,7 +77,7 @@ def test_a_resumed_capture_keeps_what_was_decided(after: int) -> None:
     with pytest.raises(KeyboardInterrupt):
         captured(sink, events, looks())
     sink.die_after = 10**6
-    again = Told(r1=Look(known=False, text="another"), r2=Look(known=after < 3, text="2 of 2 units decided"))
+    again = Told({1: Look(known=False, text="another"), 2: Look(known=after < 3, text="2 of 2 units decided")})
     before = [event for event in events.events if event.kind in ("look", "known")]
     captured(sink, events, again)
     assert set(sink.records) == set(whole.records)

@@ -2,30 +2,21 @@
 
 import hashlib
 from dataclasses import replace
-from datetime import UTC, date, datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 from capture_double import small_run
 from each import each
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from in_process import document_of, refused
 from in_process import given as asked
 from laboratory import LABORATORY
 from ledger_events import day, event
 
 from benchmarks.generated_ledger import write_events
-from pipelines.archive import Run
-from pipelines.certificates import Ledger, LedgerEntry
+from pipelines.certificates import Ledger
 from pipelines.certificates.days import day_of, months_after
-from pipelines.certificates.validity import calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
-
-
-@pytest.fixture
-def run(tmp_path: Path) -> Run:
-    return small_run(tmp_path, {"A3": "silent"})
 
 
 @pytest.fixture
@@ -129,31 +120,6 @@ def test_two_kinds_of_device_under_one_serial_are_told(ledger: Ledger) -> None:
     assert ledger.add(later)[0].action == "supersede"  # an import states no device
 
 
-DAYS = st.integers(0, 40).map(lambda n: (date(2026, 1, 1) + timedelta(days=n)).isoformat())
-STEPS = st.lists(st.tuples(st.sampled_from(["certify", "supersede", "revoke"]), DAYS, DAYS), max_size=12)
-
-
-@given(STEPS)
-@settings(max_examples=50, deadline=None)
-def test_no_two_calibrations_of_a_unit_hold_on_one_day_whatever_is_written(steps: list[tuple[str, str, str]]) -> None:
-    events: list[LedgerEntry] = []
-    for number, (action, start, until) in enumerate(steps, 1):
-        known = calibrations_of(events)
-        made = event(start=start, until=until, run=f"r-{number}", sequence=len(events) + 1)
-        if action == "revoke":
-            ends = tuple(one.event.sequence for one in known)
-            events.append(replace(made, action="revoke", ends=ends))
-        elif start < until:
-            try:
-                ends = overlapped(known, start, until, supersede=action == "supersede")
-            except WrongUse:
-                continue
-            events.append(replace(made, action="supersede" if ends else "certify", ends=ends))
-    for n in range(42):
-        day = (date(2026, 1, 1) + timedelta(days=n)).isoformat()
-        assert sum(one.holds(day) for one in calibrations_of(events)) <= 1
-
-
 def test_a_day_is_that_of_utc_and_months_end_on_the_last_day_where_there_is_no_such_day() -> None:
     for text, told in (
         ("2026-05-01", "2026-05-01"), ("2026-05-01T23:30:00-02:00", "2026-05-02"), ("2026-05-01T12:00:00Z", "2026-05-01"),
@@ -166,9 +132,10 @@ def test_a_day_is_that_of_utc_and_months_end_on_the_last_day_where_there_is_no_s
 
 
 def test_units_that_passed_are_certified_and_show_tells_the_calibration_of_a_date_with_origin_and_end(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    run = small_run(tmp_path, {"A3": "silent"})
     Path("lab.toml").write_text(LABORATORY, encoding="utf-8")
     own = ("--archive", run.archive.root)
     document = document_of("certificate", "issue", run.id, *own, status=1)

@@ -7,11 +7,13 @@ from typing import Any
 import pandas as pd
 import pytest
 from capture_double import AT_ROOM, recipe_file
+from each import each
 from in_process import refused
 from once import once
 
 from inertial.fits.known import noise_guard
 from pipelines.archive import Archive, Run
+from pipelines.capture.look import Look
 from pipelines.chain.chain import ORDER
 from pipelines.chain.looks import LotLooks
 from pipelines.chain.runner import Runner
@@ -51,6 +53,11 @@ def job_of(folder: Path, bias: float) -> Job:
     return Request(recipe=recipe_of(folder, bias)).job()
 
 
+def at_the_end(run: Run, job: Job, terms: StopTerms, told: frozenset[str] = frozenset()) -> Look:
+    """What a look at all records of the run says."""
+    return LotLooks(job, terms, run.records).look(int(run.table("readings")["record"].max()), told)
+
+
 def made(folder: Path) -> tuple[Path, str]:
     runner = Runner(job_of(folder, 800.0), Archive(folder / "archive"))
     for stage in ORDER[: ORDER.index("budget") + 1]:
@@ -66,7 +73,6 @@ def run() -> Run:
 
 def test_a_lot_that_knows_enough_ends(run: Run) -> None:
     end = early_end(run)
-    assert end is not None
     assert end["ended"]
     taken = run.table("readings").drop_duplicates("record")["kind"].value_counts()
     assert 10 <= taken["dwell"] < 24
@@ -75,16 +81,11 @@ def test_a_lot_that_knows_enough_ends(run: Run) -> None:
 
 
 def test_what_the_look_says_is_what_the_run_states(run: Run, tmp_path: Path) -> None:
-    """U of a look at all records is that of the run's budget, its guard apart: there is one estimate."""
-    job = job_of(tmp_path, 800.0)
-    assert run.records is not None
-    looks = LotLooks(job, StopTerms(bias_ug=800.0), run.records)
+    job, terms = job_of(tmp_path, 800.0), StopTerms(bias_ug=800.0)
     stated = run.table("uncertainties").query("quantity == 'bias'")["u"].max()
-    guard = noise_guard(int(run.table("wander")["dof"].sum()), len(looks._due))
-    found = looks.look(int(run.table("readings")["record"].max()), frozenset())
-    assert found.text.startswith(
-        f"U at most {2.0 * stated / 800.0:.2f} of what is asked (times {guard:.2f} as allowance for its noise), "
-    )
+    guard = noise_guard(int(run.table("wander")["dof"].sum()), len(LotLooks(job, terms, run.records)._due))
+    told = f"U at most {2.0 * stated / 800.0:.2f} of what is asked (times {guard:.2f} as allowance for its noise), "
+    assert at_the_end(run, job, terms).text.startswith(told)
 
 
 @pytest.mark.slow
@@ -94,10 +95,7 @@ def test_a_unit_beyond_its_limit_is_told_once(run: Run, tmp_path: Path) -> None:
     name = next(name for name in figures if name.endswith("_mg"))
     figures[name] = figures[name].model_copy(update={"max": 0.5})
     strict = Job(job.recipe, job.limits.model_copy(update={"figures": figures}), job.lot, job.station)
-    assert run.records is not None
-    looks = LotLooks(strict, StopTerms(bias_ug=1.0), run.records)
-    last = int(run.table("readings")["record"].max())
-    told = looks.look(last, frozenset({"A1"}))
+    told = at_the_end(run, strict, StopTerms(bias_ug=1.0), frozenset({"A1"}))
     assert told.known
     assert set(told.fails) == {"A2", "A3"}
     assert "limit 0.5 mg" in told.fails["A2"]
@@ -111,10 +109,7 @@ def test_a_unit_that_is_not_fitted_is_not_decided(run: Run, tmp_path: Path, monk
         return verdicts.assign(refused=verdicts["refused"] | (verdicts["unit"] == "A2"))
 
     monkeypatch.setattr("pipelines.chain.looks.validate", one_refused)
-    assert run.records is not None
-    looks = LotLooks(job_of(tmp_path, 800.0), StopTerms(), run.records)
-    found = looks.look(int(run.table("readings")["record"].max()), frozenset())
-    assert found.text == "2 of 2 units decided, 1 not fitted"
+    assert at_the_end(run, job_of(tmp_path, 800.0), StopTerms()).text == "2 of 2 units decided, 1 not fitted"
 
 
 @pytest.mark.parametrize("stated", [True, False])
@@ -128,7 +123,6 @@ def test_an_uncertainty_that_was_asked_for_and_not_reached_is_said(
     if not stated:
         monkeypatch.setattr(Run, "table", lambda run, name: sums[:0] if name == "uncertainties" else tables(run, name))
     end = early_end(run)
-    assert end is not None
     found = {one["unit"]: one["share"] for one in end["not_reached"] if one["figure"] == "bias"}
     by_unit = sums[sums["quantity"] == "bias"].groupby("unit")["u" if stated else "u_a"].max()
     assert found == pytest.approx((by_unit / 50.0).to_dict())
@@ -140,7 +134,6 @@ def test_the_period_counts_from_dwells_as_long_as_they_were(run: Run) -> None:
     tables = BudgetTables(**{name: run.table(name) for name in names})
     longer = replace(tables, dwells=tables.dwells.assign(duration_s=3.0))
     terms = archived_terms(run.about)
-    assert terms is not None
     assert not terms.dwells_chosen
     chosen = replace(terms, dwells_chosen=True)
     assert [lot_budget(longer, one).terms.dwell_s for one in (terms, chosen)] == [1.0, 3.0]
@@ -155,35 +148,28 @@ def test_a_model_that_is_not_adequate_keeps_the_lot_going(run: Run, tmp_path: Pa
     figures = {"zero_g_offset_mg": job.limits.figures["zero_g_offset_mg"]}
     recipe = job.recipe.model_copy(update={"effects": ["bias", "scale"]})
     plain = Job(recipe, job.limits.model_copy(update={"figures": figures}), job.lot, job.station)
-    assert run.records is not None
-    found = LotLooks(plain, StopTerms(), run.records).look(int(run.table("readings")["record"].max()), frozenset())
+    found = at_the_end(run, plain, StopTerms())
     assert not found.known
     assert found.text == "3 of 3 units decided; the model is not adequate, a diagnosis needs the other dwells"
 
 
 def test_effects_that_must_be_visible_keep_the_lot_going(run: Run, tmp_path: Path) -> None:
-    job = job_of(tmp_path, 800.0)
-    assert run.records is not None
-    looks = LotLooks(job, StopTerms(visible=["bias_temperature"]), run.records)
-    found = looks.look(int(run.table("readings")["record"].max()), frozenset())
+    found = at_the_end(run, job_of(tmp_path, 800.0), StopTerms(visible=["bias_temperature"]))
     assert not found.known
     assert found.text.endswith("; bias_temperature not visible yet")
 
 
-@pytest.mark.parametrize(
-    ("bias", "more", "message"),
-    [
-        (0.001, "", "[stop] asks for U = 0.001 µg of bias, the references alone have U ="),
-        (800.0, 'visible = ["no_such"]', "no_such"),
-        (800.0, 'visible = ["bias"]', "key 'stop.visible': bias in the model, effects beside it are needed"),
-        (800.0, 'visible = ["bias_temperature"]', "the whole plan does not show bias_temperature"),
-        (800.0, "longest_dwell_s = 0.6", "key 'stop.longest_dwell_s': 0.6 s, dwell_s is 1 s"),
-        (
-            800.0,
-            "scale_temperature_ppm_K = 5.0",
-            "an uncertainty of scale_temperature is asked for, the model has no such",
-        ),
-    ],
-)
-def test_what_can_never_end_a_lot_is_refused(tmp_path: Path, bias: float, more: str, message: str) -> None:
+ENDLESS = [
+    (0.001, "", "[stop] asks for U = 0.001 µg of bias, the references alone have U ="),
+    (800.0, 'visible = ["no_such"]', "no_such"),
+    (800.0, 'visible = ["bias"]', "key 'stop.visible': bias in the model, effects beside it are needed"),
+    (800.0, 'visible = ["bias_temperature"]', "the whole plan does not show bias_temperature"),
+    (800.0, "longest_dwell_s = 0.6", "key 'stop.longest_dwell_s': 0.6 s, dwell_s is 1 s"),
+    (800.0, "scale_temperature_ppm_K = 5.0", "uncertainty of scale_temperature is asked for, the model has no such"),
+]
+
+
+@each(ENDLESS)
+def test_what_can_never_end_a_lot_is_refused(row: tuple[float, str, str], tmp_path: Path) -> None:
+    bias, more, message = row
     assert message in refused("run", recipe_of(tmp_path, bias, more), "--direct", "--archive", tmp_path / "archive")

@@ -50,16 +50,10 @@ def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, c
     share = f"({100.0 * first['share']:.0f} %)"
     print_diagnosis(document, data=None, model=None, brief=False)
     text = " ".join(capsys.readouterr().out.split())
-    assert (
-        f"dwells with the largest influence on {' or '.join(group['effects'])}: {first['unit']} dwell {first['dwell']} {share}"
-        in text
-    )
+    told = f"{first['unit']} dwell {first['dwell']} {share}"
+    assert f"dwells with the largest influence on {' or '.join(group['effects'])}: {told}" in text
     assert f"without these {without['dwells']} p" in text
-    html = page.read_text(encoding="utf-8")
-    assert (
-        f"{first['unit']} dwell {first['dwell']} {share}"
-        in html.split("Dwells with the largest influence on the verdict")[1]
-    )
+    assert told in page.read_text("utf-8").split("Dwells with the largest influence on the verdict")[1]
 
 
 def test_missing_dwells_are_told_in_the_report_and_at_the_terminal(tmp_path):

@@ -2,7 +2,6 @@
 
 import shlex
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 
 from each import each
@@ -17,7 +16,6 @@ from pipelines.cli.former import OPTIONS, present
 NOW = {
     "certify latest --from 2026-01-01 --months 12": "certificate issue latest --since 2026-01-01 --until 12m",
     "certificate latest --password-file p --sign-with k": "certificate write latest --sign-with k,p",
-    "certificate write latest": "certificate write latest",
     "certificate --help": "certificate --help",
     "revoke --certificate 2 SN1": "certificate revoke SN1 2",
     "choose --range 4g --error=2mg --device A": "plan choose --device A range=4g error=2mg",
@@ -26,16 +24,12 @@ NOW = {
     "import a.csv --units output=g --unit SN1 --poses a=+x": "import a.csv --unit-of output=g --units SN1 --set poses=a=+x",
     "import a.csv --units SN1": "import a.csv --units SN1",
     "correct a.csv --cutoff 9 --filter=fir --calibration latest:A1": "correct a.csv --filter=fir:9 latest:A1",
-    "correct a.csv --cutoff 9": "correct a.csv --filter :9",
     "plan r --noise 25 --wander 8": "plan r --noise 25,8",
     "plan optimise r --criterion T --part a,b --ramp": "plan optimise --set ramp=yes r --criterion T:a,b",
-    "plan optimize r --factor 2": "plan optimize r --set factor=2",
     "monitor --port 9000 --serve": "station monitor --port 9464 --port 9000",
-    "query 'select 1' --csv": "archive query --output - 'select 1'",
     "extend m.toml --remove x --why -- --why": "extend m.toml --remove x --reason -- --why",
     "release --list": "release",
     "simulate a --no-noise --failed --time t": "simulate --seed none --include failed a --map time=t",
-    "run my.toml --no-prompts": "run my.toml --yes",
     "": "",
 }
 
@@ -88,11 +82,7 @@ def test_the_help_has_thirty_commands_and_hundred_options_at_most() -> None:
     assert len(COMMANDS) <= 30
     names = set()
     for name in COMMANDS:
-        assert import_module(f"pipelines.cli.{COMMANDS[name].module}").EXAMPLES
         for _, leaf in leaves(get_command(app).get_command(None, name)._load(), name):
-            names |= {
-                max(parameter.opts, key=len)
-                for parameter in leaf.params
-                if parameter.param_type_name == "option" and not parameter.hidden
-            }
+            shown = [one for one in leaf.params if one.param_type_name == "option" and not one.hidden]
+            names |= {max(one.opts, key=len) for one in shown}
     assert len(names) <= 100, sorted(names)

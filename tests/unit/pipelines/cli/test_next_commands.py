@@ -40,9 +40,7 @@ def told(made: dict[str, Any], model: Path | None) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in lines]
 
 
-def test_an_improvement_alternatives_and_a_refuted_effect_have_model_fresh_run_output_author_and_dwells_left_out() -> (
-    None
-):
+def test_an_improvement_alternatives_and_a_refuted_effect_have_all_that_the_command_before_was_given() -> None:
     (words,) = told(document(), Path("model.toml"))
     assert words[:2] == ["improve", "dwells.csv"]
     assert has(words, ("--model", "model.toml", *TEMPERATURES, *ARCHIVE, *EFFECTS, *LEFT, *AGAIN, *KEPT))
@@ -68,32 +66,22 @@ def test_an_extension_has_the_effects_and_its_ladder_the_fresh_run() -> None:
     assert has(second, EFFECTS)
     assert "--formula" not in second
     assert has(ladder, ("--dwells", "dwells.csv", *TEMPERATURES, *ARCHIVE, *EFFECTS, *LEFT, *AGAIN))
-    assert (
-        unknown_options(shlex.join(["tumbleline", *first]))
-        == unknown_options(shlex.join(["tumbleline", *ladder]))
-        == set()
-    )
+    assert [unknown_options(shlex.join(["tumbleline", *words])) for words in (first, ladder)] == [set(), set()]
 
 
-CASES: dict[str, tuple[dict[str, Any], str, tuple[str, ...]]] = {
-    "added": ({"added": ["damp"], "file": "new.toml", "next": []}, "fit", ("--model", "new.toml", *LEFT, *EFFECTS)),
-    "faulty": (
-        {"diagnosis": {"leave_out": {"dwells": [{"unit": "U1", "dwell": 7}]}, "blocked_by": []}, "next": []},
-        "improve",
-        ("--model", "m.toml", "--leave-out", "U1:3,U1:7", *EFFECTS, *AGAIN, *KEPT),
-    ),
-    "inadequate": (
-        {"diagnosis": {"leave_out": None, "blocked_by": [], "adequate": False}, "next": []},
-        "diagnose",
-        ("--model", "m.toml", *LEFT, *EFFECTS),
-    ),
+FAULTY = {"leave_out": {"dwells": [{"unit": "U1", "dwell": 7}]}, "blocked_by": []}
+INADEQUATE = {"leave_out": None, "blocked_by": [], "adequate": False}
+CASES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {  # by the command that follows
+    "fit": ({"added": ["damp"], "file": "new.toml"}, ("--model", "new.toml", *LEFT, *EFFECTS)),
+    "improve": ({"diagnosis": FAULTY}, ("--model", "m.toml", "--leave-out", "U1:3,U1:7", *EFFECTS, *AGAIN, *KEPT)),
+    "diagnose": ({"diagnosis": INADEQUATE}, ("--model", "m.toml", *LEFT, *EFFECTS)),
 }
 
 
 @each(CASES)
-def test_what_follows_a_recording_has_them_as_well(case: str) -> None:
-    changes, name, options = CASES[case]
-    line = next_of_recording(document(**changes), {"run": "R", "fit": "norm"}, GIVEN, ("--model", "m.toml"), KEPT)[0]
+def test_what_follows_a_recording_has_them_as_well(name: str) -> None:
+    (changes, options), run = CASES[name], {"run": "R", "fit": "norm"}
+    line = next_of_recording(document(next=[], **changes), run, GIVEN, ("--model", "m.toml"), KEPT)[0]
     assert unknown_options(line) == set()
     words = shlex.split(line)[1:]
     assert words[:2] == [name, "R"]

@@ -3,6 +3,7 @@
 import lots
 import numpy as np
 import pytest
+from each import each
 from long_suites import mostly_slow
 
 from benchmarks.hand_turned import make as turned_by_hand
@@ -38,9 +39,9 @@ def test_an_effect_that_is_not_there_does_not_look_like_progress_on_a_fresh_run(
     assert more["heldout_rms_ug"] > plain["heldout_rms_ug"]
 
 
-@pytest.mark.parametrize("letters", ["x", "xy", "xyz"])
-@pytest.mark.parametrize("units", [1, 3])
-def test_the_error_by_axis_is_that_of_each_axis_with_an_output(rng, letters: str, units: int) -> None:
+@each([(letters, units) for letters in ("x", "xy", "xyz") for units in (1, 3)])
+def test_the_error_by_axis_is_that_of_each_axis_with_an_output(row: tuple[str, int], rng) -> None:
+    letters, units = row
     noise_ug = {"x": 10.0, "y": 30.0, "z": 90.0}
     table = lots.lot(rng, units=units, noise_ug=1.0, temperatures=(25.0, 25.0))
     for axis, size in noise_ug.items():
@@ -93,23 +94,19 @@ def test_deviations_of_the_samples_in_another_unit_than_the_outputs_are_told(rng
 @pytest.mark.usefixtures("no_next_measurement")
 def test_effects_of_a_table_are_told_to_be_untried_where_its_angles_are_missing(rng) -> None:
     table = lots.lot(rng, units=2, temperatures=(25.0, 25.0))
-    angles = ("outer_deg", "inner_deg")
-    force = frames.force_from_angles(*(np.deg2rad(table[name].to_numpy()) for name in angles))
-    forces = table.drop(columns=list(angles))
-    forces[["force_x", "force_y", "force_z"]] = force
+    angles = ["outer_deg", "inner_deg"]
+    forces = table.drop(columns=angles)
+    forces[["force_x", "force_y", "force_z"]] = frames.force_from_angles(*np.deg2rad(table[angles].to_numpy().T))
     follows = {"driver": "pose", "shape": "curve", "text": "the error follows pose", "period_s": None, "p_value": 1e-9}
+    plain = table.drop(columns=["unit_C", "chamber_C"], errors="ignore")
     told = [
-        unexplained_text({**examination(known, None, None).document, "unexplained": follows})
-        for known in (table, forces)
+        unexplained_text({**examination(known, None, None).document, "unexplained": {**follows, "driver": driver}})
+        for known, driver in ((table, "pose"), (forces, "pose"), (plain, "time_s"))
     ]
-    heat = {**follows, "driver": "time_s"}
-    plain = examination(table.drop(columns=["unit_C", "chamber_C"], errors="ignore"), None, None).document
-    assert "more could not be tried: record them in the column unit_C" in unexplained_text(
-        {**plain, "unexplained": heat}
-    )
     assert "angles" not in told[0]
     assert "backlash" in told[1]
     assert "record outer_deg and inner_deg" in told[1]
+    assert "more could not be tried: record them in the column unit_C" in told[2]
 
 
 @pytest.mark.slow

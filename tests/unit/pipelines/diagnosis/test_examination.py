@@ -15,38 +15,16 @@ pytestmark = pytest.mark.usefixtures("no_next_measurement")
 
 BASE = ["bias", "scale", "misalignment"]
 OUT = ["out_x", "out_y", "out_z"]
+SAMPLES = [*OUT, "sd_x", "sd_y", "sd_z"]
 
 
-def axis_flip(table, rows, rng):
-    table.loc[rows, "out_y"] *= -1.0
+def put(columns, dwells, change):
+    """A fault: what some dwells of a unit have in columns (n, k), changed by ``change(values, rng)``."""
 
+    def spoil(table, rows, rng):
+        table.loc[rows[dwells], columns] = change(table.loc[rows[dwells], columns].to_numpy(dtype=float), rng)
 
-def swap_axes(table, rows, rng):
-    table.loc[rows, ["out_x", "out_y"]] = table.loc[rows, ["out_y", "out_x"]].to_numpy()
-
-
-def swapped_dwells(table, rows, rng):
-    table.loc[rows[[3, 10]], OUT] = table.loc[rows[[10, 3]], OUT].to_numpy()
-
-
-def wrong_units(table, rows, rng):
-    table.loc[rows, [*OUT, "sd_x", "sd_y", "sd_z"]] *= 9.80665
-
-
-def wrong_range(table, rows, rng):
-    table.loc[rows[30:], [*OUT, "sd_x", "sd_y", "sd_z"]] *= 2.0
-
-
-def stuck_output(table, rows, rng):
-    table.loc[rows[20:30], OUT] = table.loc[rows[20], OUT].to_numpy(dtype=float)
-
-
-def dead_channel(table, rows, rng):
-    table.loc[rows, "out_z"] = 0.01 + rng.normal(0.0, 1e-5, len(rows))
-
-
-def stale_temperature(table, rows, rng):
-    table.loc[rows[20:], "unit_C"] = table.loc[rows[20], "unit_C"]
+    return spoil
 
 
 def spikes(table, rows, rng):
@@ -54,23 +32,21 @@ def spikes(table, rows, rng):
     table.loc[rows[[5, 6, 40]], "sd_x"] *= 40.0
 
 
-def quantised(table, rows, rng):
-    table.loc[rows, OUT] = np.round(table.loc[rows, OUT].to_numpy() / 2e-4) * 2e-4
-
-
-def clock_jitter(table, rows, rng):
-    table.loc[rows[30:], "time_s"] -= 2000.0
-
-
-def dropped_samples(table, rows, rng):
-    table.loc[rows[10:20], "n"] = 400
-
-
-AT_ONCE = (axis_flip, swapped_dwells, wrong_units, wrong_range, stuck_output, dead_channel)
-OF_SOME = (stale_temperature, spikes, quantised, clock_jitter, dropped_samples)
-FAULTS = {"axis_flip ": swap_axes} | {fault.__name__: fault for fault in (*AT_ONCE, *OF_SOME)}
-
-
+ALL = slice(None)
+FAULTS = {
+    "axis_flip": put(["out_y"], ALL, lambda values, _: -values),
+    "axis_flip ": put(OUT, ALL, lambda values, _: values[:, [1, 0, 2]]),
+    "swapped_dwells": put(OUT, [3, 10], lambda values, _: values[::-1]),
+    "wrong_units": put(SAMPLES, ALL, lambda values, _: 9.80665 * values),
+    "wrong_range": put(SAMPLES, slice(30, None), lambda values, _: 2.0 * values),
+    "stuck_output": put(OUT, slice(20, 30), lambda values, _: values[0]),
+    "dead_channel": put(["out_z"], ALL, lambda values, rng: 0.01 + rng.normal(0.0, 1e-5, values.shape)),
+    "stale_temperature": put(["unit_C"], slice(20, None), lambda values, _: values[0]),
+    "spikes": spikes,
+    "quantised": put(OUT, ALL, lambda values, _: np.round(values / 2e-4) * 2e-4),
+    "clock_jitter": put(["time_s"], slice(30, None), lambda values, _: values - 2000.0),
+    "dropped_samples": put(["n"], slice(10, 20), lambda values, _: 0.0 * values + 400),
+}
 SEEN_ALONE = sorted(set(FAULTS) - {"wrong_units", "dropped_samples"})  # these are seen beside others only
 
 
@@ -115,9 +91,7 @@ def test_a_unit_without_some_dwells_is_diagnosed_by_those_it_has(rng):
     (notice,) = (text for text in document["warnings"] if "missing" in text)
     assert notice.startswith(f"of {count} dwells of the lot are missing: U000 1 (5), U001 {count // 3} (")
     assert f"U002 1 ({count - 1})" in notice
-    axis_flip(
-        table, table.index[table["unit"] == "U003"].to_numpy(), rng
-    )  # a fault of one unit leaves the others alone
+    FAULTS["axis_flip"](table, table.index[table["unit"] == "U003"].to_numpy(), rng)  # it leaves the others alone
     document = diagnose(table)
     assert [b["units"] for b in document["blocked_by"]] == [["U003"]]
     assert document["recommended"] == ["third_order"]
@@ -159,10 +133,10 @@ def test_clean_lots_raise_no_alarm(seed):
 
 
 def test_a_clipped_output_is_physics_and_no_fault(rng):
-    table = lots.lot(
-        rng, plan="six", temperatures=(0, 25, 50, 25), hidden=lambda f, t, s, r: np.clip(f, -0.97, 0.97) - f
-    )
-    assert diagnose(table)["blocked_by"] == []
+    def hidden(force, *_):
+        return np.clip(force, -0.97, 0.97) - force
+
+    assert diagnose(lots.lot(rng, plan="six", temperatures=(0, 25, 50, 25), hidden=hidden))["blocked_by"] == []
 
 
 def test_dwells_that_are_too_many_to_be_judged_at_once_are_told(rng, monkeypatch):

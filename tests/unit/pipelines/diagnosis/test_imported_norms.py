@@ -27,21 +27,10 @@ PLAIN = ("bias", "scale", "misalignment")
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "most"), [(4, 1), (8, 2)])
 def test_white_noise_and_a_long_first_rest_are_adequate(count: int, most: int) -> None:
-    """Of eight such recordings three were called inadequate while sd/√n was ignored and wander was not seen along the force."""
     names = list(NOISES)
     documents = [diagnose(make(Recording(24 + 4 * k, names[k % 4]), 600 + k).dwells) for k in range(count)]
     assert sum(d["adequate"] is False for d in documents) <= most
     assert all(d["classes"] == [] and d["unexplained"] is None for d in documents)
-
-
-@pytest.mark.slow
-def test_the_verdict_does_not_depend_on_the_unit_of_the_samples() -> None:
-    dwells = make(Recording(30), 5).dwells
-    columns = [f"{kind}_{axis}" for kind in ("out", "sd") for axis in "xyz"]
-    in_volt = dwells.assign(**{name: 1e-4 * dwells[name] for name in columns}, out_unit="V")
-    first, second = diagnose(dwells)["error"], diagnose(in_volt)["error"]
-    assert first["rms_ug"] == pytest.approx(second["rms_ug"], rel=1e-4)
-    assert first["white_noise_ug"] == pytest.approx(second["white_noise_ug"], rel=1e-4)
 
 
 def test_few_dwells_cannot_be_judged_and_nothing_is_named_but_a_gross_misfit_is_not_adequate() -> None:
@@ -85,7 +74,6 @@ def test_what_the_verdict_rests_on_stands_beside_it() -> None:
     hidden = slow_noise(diagnose(hand_turned.make("warm_up", 1, 1.5)))
     assert hidden.startswith("white noise is 24.9 µg, the rest counts as slow noise")
     assert "warm_up below 1" in hidden
-    assert few["condition"] > 1.0
 
 
 @pytest.mark.slow
@@ -98,12 +86,11 @@ def test_the_smallest_cubic_is_one_that_is_seen_in_about_half_of_the_recordings(
 
 
 def test_bad_dwells_are_named_and_left_out_before_physics() -> None:
-    count = 2
-    made = make(Recording(26, "white 280, B 30", bad=count, bad_ug=5000.0), 40 + count)
+    made = make(Recording(26, "white 280, B 30", bad=2, bad_ug=5000.0), 42)
     document = diagnose(made.dwells)
     assert document["adequate"] is False
     assert {d["dwell"] for d in document["leave_out"]["dwells"]} == set(made.spoilt)
-    assert [g["effects"] for g in document["classes"]] == [["bad_dwell"]] * count
+    assert [g["effects"] for g in document["classes"]] == [["bad_dwell"]] * 2
     without = leave_out(made.dwells, [("HAND-1", dwell) for dwell in made.spoilt])
     assert diagnose(without)["adequate"] is document["leave_out"]["adequate_without"]
 
@@ -126,13 +113,11 @@ def test_a_warm_up_of_unknown_poses_comes_back_with_its_uncertainty() -> None:
     before = norms_fitted(made.dwells, None, PLAIN)
     after = norms_fitted(made.dwells, None, (*PLAIN, "warm_up"))
     assert 1e6 * after.rms < 0.3e6 * before.rms
-    size, error = after.fit.fit.coefficients[0, 0, 4], after.fit.fit.standard_errors[0, 0, 4]
-    assert abs(size / made.response[0, 0] - 3e-3) < 3.5 * error / made.response[0, 0]
-    tau, spread = after.fit.fit.nonlinear["warm_up"]["tau"], after.fit.nonlinear_error["warm_up"]["tau"]
-    assert abs(tau - 250.0) < 3.5 * spread
-    assert np.all(
-        np.abs(after.fit.fit.coefficients[0, :, 0] - made.bias) < 5.0 * after.fit.fit.standard_errors[0, :, 0]
-    )
+    fit = after.fit.fit
+    value, error = fit.coefficients[0], fit.standard_errors[0]
+    assert abs(value[0, 4] - 3e-3 * made.response[0, 0]) < 3.5 * error[0, 4]
+    assert abs(fit.nonlinear["warm_up"]["tau"] - 250.0) < 3.5 * after.fit.nonlinear_error["warm_up"]["tau"]
+    assert np.all(np.abs(value[:, 0] - made.bias) < 5.0 * error[:, 0])
 
 
 @each([
@@ -147,16 +132,10 @@ def test_what_the_norm_does_not_determine_is_refused_by_name(row: tuple[tuple[st
 
 
 @pytest.mark.slow
-def test_a_drift_after_switching_on_of_eight_times_the_noise_is_named() -> None:
-    document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2300.0), 96_005_004).dwells)
-    assert any("warm_up" in group["effects"] for group in document["classes"])
-
-
-@pytest.mark.slow
 def test_a_memory_that_was_at_rest_has_no_column_for_its_state() -> None:
-    """`diagnose` of one recording in 40 with a drift after switching on ended in a traceback."""
-    document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2000.0), 96_005_004).dwells)
-    assert document["adequate"] is False  # the p of the drift, 4.1e-6, is that of one in 245 tests: named or not
+    document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2300.0), 96_005_004).dwells)
+    assert document["adequate"] is False
+    assert any("warm_up" in group["effects"] for group in document["classes"])
     # a class of several names the effect that its parameters are of
     group = {"effects": ["aging_linear", "warm_up"], "scope": "sensor"}
     group |= {"nonlinear": {"tau": 7200.0}, "nonlinear_of": "warm_up"}

@@ -65,9 +65,8 @@ def test_a_page_says_what_its_command_says(settings: WorkbenchSettings) -> None:
     )
     state, outcome = done_in_process("diagnose", requests.diagnosis(settings, page)[1], lambda *_: None)
     assert state == "done"
-    words = page.arguments()
     with effects.additions_forgotten():
-        told = document_of(*words)
+        told = document_of(*page.arguments())
     assert told["error"] == pytest.approx(outcome.document["error"])
     assert told["effects"] == outcome.document["effects"] == [*page.effects, "late"]
     assert told["classes"] == outcome.document["classes"]

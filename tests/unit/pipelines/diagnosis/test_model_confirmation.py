@@ -23,14 +23,10 @@ def missed(size: float, density: float) -> LeftOut:
     return LeftOut({"blocks of time": size * rng.standard_normal((1, 30))}, {"blocks of time": density})
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "predicts"),
-    [(10.0, 9.0, True), (10.0, 10.04, True), (10.0, 550.0, False), (10.0, np.nan, True), (np.nan, 9.0, True)],
-)
-def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_worse(
-    before: float, after: float, predicts: object
-) -> None:
-    assert Named(SimpleNamespace(), 1.0, before, after).predicts is predicts
+def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_worse() -> None:
+    for before, after in ((10.0, 9.0), (10.0, 10.04), (10.0, np.nan), (np.nan, 9.0)):
+        assert Named(SimpleNamespace(), 1.0, before, after).predicts is True, (before, after)
+    assert Named(SimpleNamespace(), 1.0, 10.0, 550.0).predicts is False
 
 
 @each([
@@ -56,9 +52,8 @@ def test_a_gain_in_density_confirms_neither_an_error_that_rises_nor_a_fall_withi
     assert "rises from" in text_of(ROW, worse)
     better = confirmation._by_left_out(missed(1e-4, 100.0), missed(0.5e-4, 150.0))
     assert (better["confirmed"], better["rises"]) == (True, None)
-    assert text_of(ROW, better).endswith(
-        " (k = 2) µg where it falls least of the poses, soaks and stretches of time left out"
-    )
+    told = " (k = 2) µg where it falls least of the poses, soaks and stretches of time left out"
+    assert text_of(ROW, better).endswith(told)
     before = missed(1e-4, 100.0)
     once = before.missed["blocks of time"].copy()
     once[:, :5] *= 0.5  # one stretch of six has the whole fall
@@ -72,16 +67,17 @@ def test_a_gain_in_density_confirms_neither_an_error_that_rises_nor_a_fall_withi
     assert text.count("the error falls by") == 1
 
 
-@pytest.mark.parametrize(("density", "confirmed"), [(120.0, True), (103.0, None)])
-def test_all_kinds_of_dwells_left_out_that_can_judge_have_to_agree(density: float, confirmed: object) -> None:
-    wide, narrow = missed(1e-4, 100.0), missed(0.5e-4, 150.0)
-    before = LeftOut({**wide.missed, "poses": wide.missed["blocks of time"]}, {**wide.density, "poses": 100.0})
-    after = LeftOut({**narrow.missed, "poses": narrow.missed["blocks of time"]}, {**narrow.density, "poses": density})
+@each([(120.0, True), (103.0, None)])
+def test_all_kinds_of_dwells_left_out_that_can_judge_have_to_agree(row: tuple[float, object]) -> None:
+    density, confirmed = row
+    before, after = (
+        LeftOut(one.missed | {"poses": one.missed["blocks of time"]}, one.density | {"poses": of_poses})
+        for one, of_poses in ((missed(1e-4, 100.0), 100.0), (missed(0.5e-4, 150.0), density))
+    )
     evidence = confirmation._by_left_out(before, after)
     assert evidence["confirmed"] is confirmed
-    assert ("with poses left out the log likelihood changes by +3.0" in (evidence["reason"] or "")) is (
-        confirmed is None
-    )
+    told = "with poses left out the log likelihood changes by +3.0" in (evidence["reason"] or "")
+    assert told is (confirmed is None)
 
 
 def test_a_run_that_may_have_a_fault_confirms_nothing_by_itself() -> None:
@@ -95,9 +91,8 @@ def test_a_run_that_may_have_a_fault_confirms_nothing_by_itself() -> None:
     assert asked == []  # no search where the dwells left out do not decide
     evidence = confirmation._by_left_out(missed(1e-4, 100.0), missed(0.5e-4, 150.0), doubt)
     assert (evidence["confirmed"], evidence["reason"], asked) == (None, doubt(), ["searched", "searched"])
-    assert "not decided by this run alone: stretches of time left out confirm it (log likelihood +50.0)" in text_of(
-        ROW, evidence
-    )
+    told = "not decided by this run alone: stretches of time left out confirm it (log likelihood +50.0)"
+    assert told in text_of(ROW, evidence)
 
 
 def rising(rise: float, density: float) -> LeftOut:

@@ -25,21 +25,21 @@ def table(text: str) -> pd.DataFrame:
     return pd.DataFrame(rows[1:], columns=rows[0])
 
 
+def of(archive: Archive, *asked: str) -> list[str]:
+    """Values of attributes, each asked for by unit, run and name."""
+    return [known_attributes(archive).of(*words.split()) for words in asked]
+
+
 def test_a_changed_value_is_a_new_row_and_the_newest_counts(archive: Archive) -> None:
     first = add_attributes(archive, table("serial,wafer,firmware A1,W1,2.0 A2,W2,2.0"), "serial", "first.csv")
     assert (first["added"], first["changed"], first["file"]) == (4, 0, "000001.json")
     assert first["unknown"] == ["A1", "A2"]
     again = add_attributes(archive, table("unit,wafer A1,W1 A2,W3 A3,"), "serial", "second.csv")
     assert (again["added"], again["changed"], again["unchanged"]) == (0, 1, 1)
-    known = known_attributes(archive)
-    assert (known.of("A2", "r", "wafer"), known.of("A2", "r", "firmware"), known.of("A3", "r", "wafer")) == (
-        "W3",
-        "2.0",
-        "",
-    )
-    kept = sorted(place.name for place in (Path(str(archive.root)) / "attributes").glob("*.json"))
-    assert kept == ["000001.json", "000002.json"]
-    assert "first.csv" in (Path(str(archive.root)) / "attributes" / "000001.json").read_text("utf-8")
+    assert of(archive, "A2 r wafer", "A2 r firmware", "A3 r wafer") == ["W3", "2.0", ""]
+    kept = sorted((Path(str(archive.root)) / "attributes").glob("*.json"))
+    assert [place.name for place in kept] == ["000001.json", "000002.json"]
+    assert "first.csv" in kept[0].read_text("utf-8")
     assert "0 new values, 1 changed, 1 as before" in sentences(again)[0]
 
 
@@ -48,12 +48,7 @@ def test_a_value_of_a_run_holds_for_its_units_unless_they_have_their_own_and_wha
 ) -> None:
     add_attributes(archive, table("run,fixture r1,F1"), "run", "runs.csv")
     add_attributes(archive, table("serial,fixture A1,F2"), "serial", "units.csv")
-    known = known_attributes(archive)
-    assert (known.of("A1", "r1", "fixture"), known.of("B1", "r1", "fixture"), known.of("B1", "r2", "fixture")) == (
-        "F2",
-        "F1",
-        "",
-    )
+    assert of(archive, "A1 r1 fixture", "B1 r1 fixture", "B1 r2 fixture") == ["F2", "F1", ""]
     added = add_attributes(archive, table("serial,grade,wafer A1,pass,W1"), "serial", "a.csv")
     assert added["refused"] == ["grade"]
     assert known_attributes(archive).names() == ["fixture", "wafer"]
@@ -71,44 +66,37 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "cp1252", "utf-16"])
-@pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_a_table_is_read_as_a_spreadsheet_saves_it(
-    archive: Archive, tmp_path: Path, separator: str, encoding: str
-) -> None:
-    lines = ("serial,Größe", "A1,groß", "A2,")
+@each([(encoding, separator) for encoding in ("utf-8-sig", "cp1252", "utf-16") for separator in ",;\t"])
+def test_a_table_is_read_as_a_spreadsheet_saves_it(row: tuple[str, str], archive: Archive, tmp_path: Path) -> None:
+    encoding, separator = row
+    unit = f"{encoding}-{ord(separator)}"
+    lines = ("serial,Größe", f"{unit},groß", "A2,")
     (tmp_path / "a.csv").write_text("\r\n".join(lines).replace(",", separator), encoding=encoding)
-    added, _ = added_from(archive, tmp_path / "a.csv", "serial")
-    assert (added["added"], known_attributes(archive).of("A1", "r", "Größe")) == (1, "groß")
+    added_from(archive, tmp_path / "a.csv", "serial")
+    assert of(archive, f"{unit} r Größe") == ["groß"]
 
 
 @each(REFUSED)
-def test_tables_that_cannot_be_taken_leave_nothing(words: str, tmp_path: Path) -> None:
-    made = Archive(str(tmp_path / "archive"))
-    made.prepare()
+def test_tables_that_cannot_be_taken_leave_nothing(words: str, archive: Archive) -> None:
     with pytest.raises(WrongUse) as refusal:
-        add_attributes(made, table(words), "serial", "a.csv")
+        add_attributes(archive, table(words), "serial", "a.csv")
     assert REFUSED[words] in str(refusal.value)
-    assert not (tmp_path / "archive" / "attributes").exists()
+    assert not (archive.root / "attributes").exists()
 
 
 def test_numbers_are_quantities_where_they_have_fractions_or_are_dates() -> None:
     assert as_numbers(["1", "2", "13"]) is None  # numbers of wafers
     assert as_numbers(["0.5", "2", ""]) == {"0.5": 0.5, "2": 2.0}
     dates = as_numbers(["2026-03-01", "2026-03-04"])
-    assert dates is not None
     assert dates["2026-03-04"] - dates["2026-03-01"] == 3.0
     assert as_numbers(["W1", "0.5"]) is None
-    assert (
-        as_numbers(["2026-02-28", "2026-02-30"]) is None
-    )  # a file of an earlier version may have a day that does not exist
+    assert as_numbers(["2026-02-28", "2026-02-30"]) is None  # of an earlier version, with a day that does not exist
 
 
 def test_a_decimal_comma_is_read_where_commas_do_not_divide(archive: Archive, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("serial;radius\nA1;3,25\nA2;-4,5\nA3;1,2,3\n", encoding="utf-8")
     added_from(archive, tmp_path / "a.csv", "serial")
-    known = known_attributes(archive)
-    assert [known.of(unit, "r", "radius") for unit in ("A1", "A2", "A3")] == ["3.25", "-4.5", "1,2,3"]
+    assert of(archive, "A1 r radius", "A2 r radius", "A3 r radius") == ["3.25", "-4.5", "1,2,3"]
 
 
 def test_how_a_column_is_judged_is_said(archive: Archive) -> None:
@@ -125,9 +113,7 @@ def test_how_a_column_is_judged_is_said(archive: Archive) -> None:
 def test_a_date_after_today_is_told_once_and_kept(archive: Archive) -> None:
     added = add_attributes(archive, table("serial,assembled_on A1,2999-01-05 A2,2024-01-05"), "serial", "a.csv")
     assert added["future"] == ["2999-01-05 as assembled_on of A1"]
-    assert any(
-        "after today: 1 date (2999-01-05 as assembled_on of A1), today or earlier is needed" in s
-        for s in sentences(added)
-    )
+    told = "after today: 1 date (2999-01-05 as assembled_on of A1), today or earlier is needed"
+    assert any(told in one for one in sentences(added))
     again = add_attributes(archive, table("serial,assembled_on A1,2999-01-05"), "serial", "b.csv")
     assert again["future"] == []

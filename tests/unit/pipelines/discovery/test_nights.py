@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from calibration_rows import calibrations
 from demonstrations import wafer_line
 
 from inertial.discovery.naming import Name
@@ -18,8 +19,9 @@ from inertial.discovery.running_sums import Levels, Scale
 from inertial.discovery.station_wander import Wander
 from inertial.frames import to_fixture
 from pipelines.archive import Archive, derived, files
-from pipelines.audit.calibrations import Calibrations
+from pipelines.audit.parameters import NAMES
 from pipelines.demo.archive_lots import STATIONS, Line, write_lots, write_run
+from pipelines.discovery import coefficient_populations
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.discoveries import Discoveries, Discovery
@@ -30,13 +32,6 @@ from pipelines.discovery.nights import brought_up, remembered
 from pipelines.discovery.score_store import ScoreStore
 
 LOTS, FEW = 44, 6
-
-
-def small_line(folder: Path) -> Archive:
-    """An archive of a few small lots, scored."""
-    archive = Archive(str(write_lots(folder, Line(5, units=2), FEW).folder))
-    DiscoveryArchive(archive).score(1)
-    return archive
 
 
 @pytest.fixture(scope="module")
@@ -73,17 +68,15 @@ def test_scores_on_disk_are_few_bytes_and_nearly_those_of_the_dwells(archive: Ar
     again = ScoreStore(archive)
     again.add([before.run], 1)
     after = again.run(before.run)
-    assert before.scores is not None
-    assert after.scores is not None
     assert after.scores.score == pytest.approx(before.scores.score, rel=1e-12)  # the same bytes from the same dwells
     assert after.units == before.units
 
 
 def test_the_same_dwells_in_another_run_count_once(tmp_path: Path) -> None:
     """A file that is imported again from another format is another run; its noise would confirm itself."""
-    archive, line = Archive(str(tmp_path / "archive")), Line(5, units=2)
+    archive = Archive(str(tmp_path / "archive"))
     archive.prepare()
-    dwells, about = line.lot("line-1")
+    dwells, about = Line(5, units=2).lot("line-1")
     for number, taken in enumerate((dwells, dwells, dwells[dwells["unit"] == about["unit"][1]])):
         write_run(archive, number, "line-1", taken, about[about["unit"].isin(taken["unit"])])
     source = DiscoveryArchive(archive)
@@ -159,23 +152,22 @@ def test_a_second_night_adds_an_entry_and_rewrites_none(archive: Archive) -> Non
 def test_a_state_that_is_gone_or_edited_is_made_again(archive: Archive, caplog: pytest.LogCaptureFixture) -> None:
     before = largest(archive)
     state = Path(str(archive.root)) / "discovery" / "DEMO" / "state"
+    data = bytearray(state.read_bytes())
+    data[-40] ^= 1
+    state.write_bytes(bytes(data))
+    with caplog.at_level(logging.WARNING):
+        assert largest(archive) == pytest.approx(before, rel=1e-12)
+    assert "was edited" in caplog.text
     state.unlink()
     assert largest(archive) == pytest.approx(before, rel=1e-12)
-    brought_up(DiscoveryArchive(archive))
-    data = bytearray(state.read_bytes()) if state.exists() else bytearray()
-    if data:
-        data[-40] ^= 1
-        state.write_bytes(bytes(data))
-        with caplog.at_level(logging.WARNING):
-            assert largest(archive) == pytest.approx(before, rel=1e-12)
-        assert "was edited" in caplog.text
 
 
 @pytest.mark.slow
 def test_edited_scores_are_made_again_and_a_damaged_run_is_told_and_pooled_once_it_is_restored(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    archive = small_line(tmp_path)
+    archive = Archive(str(write_lots(tmp_path, Line(5, units=2), FEW).folder))
+    DiscoveryArchive(archive).score(1)
     (file,) = (Path(str(archive.root)) / "discovery" / "scores").iterdir()
     data = bytearray(file.read_bytes())
     data[-100] ^= 255
@@ -248,24 +240,11 @@ def test_attributes_that_come_later_start_with_the_lots_after_them(archive: Arch
 def test_two_populations_in_a_coefficient_are_told_with_their_means(
     archive: Archive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pipelines.audit.parameters import NAMES
-    from pipelines.discovery import coefficient_populations
-
     units = 200
-    rng = np.random.default_rng(3)
-    values = rng.standard_normal((units, len(NAMES)))
+    values = np.random.default_rng(3).standard_normal((units, len(NAMES)))
     values[:30, NAMES.index("bias_y")] += 5.0
-    every = Calibrations(
-        run=np.array([f"r{k}" for k in range(units)], dtype=object),
-        unit=np.array([f"U{k}" for k in range(units)], dtype=object),
-        device=np.full(units, "DEMO", dtype=object),
-        station=np.full(units, "line-1", dtype=object),
-        slot=np.zeros(units, dtype=np.int64),
-        outcome=np.full(units, "pass", dtype=object),
-        day=np.arange(units, dtype=float),
-        values=values,
-        errors=np.ones_like(values),
-    )
+    rows = [(f"U{k}", "line-1", float(k)) for k in range(units)]
+    every = calibrations(rows, values, device="DEMO", errors=1.0)
     monkeypatch.setattr(coefficient_populations, "load", lambda *_: every)
     (row,) = discovered(archive, Look(populations=True)).document["population"]
     assert (row["figure"], row["kind"], row["detail"]["units"]) == ("bias_y", "two_populations", units)
@@ -314,17 +293,14 @@ def test_shares_of_hypotheses_add_up_to_the_probability_of_an_error_and_an_effec
     """Of every night that a driver comes in; an effect of many columns takes no more than one of a single column."""
     state = brought_up(DiscoveryArchive(archive))
     state.generations["later"] = 1
+    sensor, sums = state.sensor, state.sensor.drivers["mean"]
     shares = [np.exp(-state.needed(driver)).sum() for driver in state.generations]
     assert set(state.generations) >= STATION_DRIVERS
     assert sum(shares) == pytest.approx(ALPHA * (0.5 + 0.25))
-    of_effect = np.bincount(
-        [*state.sensor.effects, *range(state.sensor.size - state.sensor.count)],
-        np.exp(-state.needed("mean")[: state.sensor.size]),
-    )
+    names = [*sensor.effects, *range(sensor.size - sensor.count)]
+    of_effect = np.bincount(names, np.exp(-state.needed("mean")[: sensor.size]))
     assert of_effect == pytest.approx(of_effect[0])
-    sensor, sums = state.sensor, state.sensor.drivers["mean"]
     effect = state.columns.index(("third_order", 0))
-    assert sensor.effects is not None
     place = sensor.count + int(sensor.effects[effect])
     axes = np.arange(3) * len(state.columns) + effect
     alarm = Alarm("mean", place, 1, 40, 20.0)
@@ -355,11 +331,9 @@ def test_errors_that_references_of_stations_have_alike_by_chance_are_not_said_to
             table.add((f"s{k}",), 1e8 * size[None], np.full((1, sensor.count), 1e8))
             sensor.wander.level(f"s{k}")
         nothing = np.zeros((1, 3))
+        alarm = Alarm("mean", 0, 1, 40, 20.0)
         names = (Name((effect,), ("mean",), ("all",), np.ones(1), nothing, nothing, 50.0) for effect in pool.effects)
-        return {
-            found._scope(Discovery(name, Alarm("mean", 0, 1, 40, 20.0), ("mean",), np.zeros(1), None))[0]
-            for name in names
-        }
+        return {found._scope(Discovery(name, alarm, ("mean",), np.zeros(1), None))[0] for name in names}
 
     pattern = rng.standard_normal((4, sensor.count))
     told = sum("sensor" in scopes(rng.standard_normal((4, 4)) @ pattern) for _ in range(40))

@@ -30,14 +30,10 @@ def made(run: str, size: float, rng: np.random.Generator) -> ScoredRun:
 def test_scores_keep_a_thirtieth_of_their_standard_deviation_and_information_a_hundredth(size: float) -> None:
     rng = np.random.default_rng(6)
     runs = [made(f"r{k}", size, rng) for k in range(5)]
-    content = content_of(written(runs))
-    assert content is not None
-    table, products = content
+    table, products = content_of(written(runs))
     for row, run in zip(table.to_pylist(), runs, strict=True):
         again = run_of(row, products)
         before, after = run.scores, again.scores
-        assert before is not None
-        assert after is not None
         seen = before.own > 0.0
         root = np.sqrt(np.where(seen, before.own, 1.0))
         exact, near = before.score / root, after.score / root
@@ -55,11 +51,8 @@ def test_products_of_columns_are_correlations_within_and_between_axes() -> None:
     lot = columns.T @ columns
     inside = np.stack([columns[:, at : at + K].T @ columns[:, at : at + K] for at in range(0, 3 * K, K)])
     run = made("r0", 1.0, rng)
-    assert run.scores is not None
     scores = replace(run.scores, products=replace(run.scores.products, lot=lot, inside=inside))
-    content = content_of(written([replace(run, scores=scores)]))
-    assert content is not None
-    (product,) = content[1].values()
+    (product,) = content_of(written([replace(run, scores=scores)]))[1].values()
     exact = lot / np.sqrt(np.outer(np.diagonal(lot), np.diagonal(lot)))
     assert product.lot == pytest.approx(exact, abs=1.0 / 256.0)
     for axis in range(3):

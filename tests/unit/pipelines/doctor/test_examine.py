@@ -5,24 +5,22 @@ import json
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from email.utils import formatdate
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from each import each
 from in_process import document_of, text_of
 from s3_server import CREDENTIALS, s3_bucket
 from served_station import modbus_station, moves_ordered, served_plant, station_file
+from small_server import answering
 
 from pipelines.archive import Archive
 from pipelines.archive.signatures import make_key
@@ -68,9 +66,6 @@ def only_fault(checks: list[Check]) -> Check:
     return fault
 
 
-# the archive and its key
-
-
 def test_a_healthy_archive_is_good_and_holds_nothing_of_the_check_afterwards(tmp_path: Path) -> None:
     archive_in(tmp_path / "a")
     before = sorted((tmp_path / "a").rglob("*"))
@@ -105,43 +100,29 @@ def test_what_is_wrong_with_an_archive_is_named(case: tuple, tmp_path: Path) -> 
     assert remedy in fault.remedy
 
 
-@contextmanager
-def as_nobody() -> Iterator[None]:
-    """A block without the rights of root, where the tests run as root."""
-    root = os.geteuid() == 0
-    if root:
-        os.seteuid(NOBODY)
-    try:
-        yield
-    finally:
-        if root:
-            os.seteuid(0)
-
-
 @pytest.fixture
-def open_folder() -> Iterator[Path]:
-    """A folder that every user may enter: those of pytest are for their owner only."""
-    folder = Path(tempfile.mkdtemp(prefix="tumbleline-test-"))
+def of_nobody() -> Iterator[Path]:
+    """An archive of a user without rights, who the test is meanwhile: pytest's folders are for their owner only."""
+    folder, root = Path(tempfile.mkdtemp(prefix="tumbleline-test-")), os.geteuid() == 0
     folder.chmod(0o755)
-    yield folder
+    archive_in(folder / "a")
+    if root:
+        os.chown(folder / "a", NOBODY, NOBODY)
+        os.seteuid(NOBODY)
+    yield folder / "a"
+    if root:
+        os.seteuid(0)
     shutil.rmtree(folder)
 
 
-@each([(0o555, "writable"), (0o000, "reachable")])
-def test_an_archive_without_permission_to_write_or_to_look_into_it_is_a_fault(
-    case: tuple[int, str], open_folder: Path
-) -> None:
-    folder = open_folder / case[1]
-    archive_in(folder)
-    assert "fault" not in states(archive_checks(str(folder), 0.0)).values()
-    folder.chmod(case[0])
-    try:
-        with as_nobody():
-            fault = only_fault(archive_checks(str(folder), 0.0))
-    finally:
-        folder.chmod(0o755)
-    assert fault.check == case[1]
-    assert "Permission denied" in fault.found
+def test_an_archive_without_permission_to_write_or_to_look_into_it_is_a_fault(of_nobody: Path) -> None:
+    for mode, check in ((0o555, "writable"), (0o000, "reachable")):
+        of_nobody.chmod(mode)
+        fault = only_fault(archive_checks(str(of_nobody), 0.0))
+        assert fault.check == check
+        assert "Permission denied" in fault.found
+        of_nobody.chmod(0o755)
+        assert "fault" not in states(archive_checks(str(of_nobody), 0.0)).values()
 
 
 FULL = """
@@ -200,41 +181,20 @@ def test_a_key_is_usable_private_and_outside_the_archive(tmp_path: Path, monkeyp
     assert only_fault(key_checks(str(tmp_path / "a"))).check == "outside the archive"
 
 
-# the orchestrator
+def of_server(
+    monkeypatch: pytest.MonkeyPatch, key: str = KEY, *, ahead_s: float = 0.0, ready: int = 200, version: str = ""
+) -> list[Check]:
+    """Of a server that answers as Prefect's does: health and readiness to everybody, the version to the key."""
 
+    def answer(request: bytes) -> bytes:
+        known, body = base64.b64encode(KEY.encode()) in request, json.dumps(version or metadata.version("prefect"))
+        statuses = {"/api/health": 200, "/api/ready": ready, "/api/admin/version": 200 if known else 401}
+        date = formatdate(time.time() + ahead_s, usegmt=True)
+        status = statuses.get(request.split()[1].decode(), 404)
+        return f"HTTP/1.1 {status} -\r\nDate: {date}\r\nContent-Length: {len(body)}\r\n\r\n{body}".encode()
 
-@contextmanager
-def server(ahead_s: float = 0.0, ready: int = 200, version: str = "") -> Iterator[str]:
-    """Address of a server that answers as Prefect's does: health and readiness to everybody, the version to the key."""
-    stated = version or metadata.version("prefect")
-
-    class Answers(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            known = self.headers.get("Authorization") == "Basic " + base64.b64encode(KEY.encode()).decode()
-            status = {"/api/health": 200, "/api/ready": ready, "/api/admin/version": 200 if known else 401}
-            self.send_response(status.get(self.path, 404))
-            self.end_headers()
-            self.wfile.write(json.dumps(stated).encode())
-
-        def date_time_string(self, timestamp: float | None = None) -> str:
-            return formatdate((timestamp or time.time()) + ahead_s, usegmt=True)
-
-        def log_message(self, *_args: object) -> None: ...
-
-    httpd = ThreadingHTTPServer(("127.0.0.1", 0), Answers)
-    thread = threading.Thread(target=httpd.serve_forever, args=(0.05,))
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{httpd.server_port}/api"
-    finally:
-        httpd.shutdown()
-        thread.join()
-        httpd.server_close()
-
-
-def of_server(monkeypatch: pytest.MonkeyPatch, key: str = KEY, **changes: object) -> list[Check]:
-    with server(**changes) as address:
-        monkeypatch.setenv("PREFECT_API_URL", address)
+    with answering(answer) as ((host, port), _):
+        monkeypatch.setenv("PREFECT_API_URL", f"http://{host}:{port}/api")
         monkeypatch.setenv("PREFECT_API_AUTH_STRING", key)
         return orchestrator_checks()
 
@@ -263,25 +223,16 @@ def test_what_is_wrong_with_a_server_is_named(
     assert "xxxx" not in repr(fault)
 
 
-def free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
-
-
 def test_an_address_is_a_fault_where_it_is_none_or_nobody_answers_there_and_none_is_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert states(orchestrator_checks()) == {"address": "not configured"}
     monkeypatch.setenv("PREFECT_API_URL", "127.0.0.1:4200")
     assert only_fault(orchestrator_checks()).check == "address"
-    monkeypatch.setenv("PREFECT_API_URL", f"http://line:secret@127.0.0.1:{free_port()}/api")
+    monkeypatch.setenv("PREFECT_API_URL", "http://line:secret@127.0.0.1:9/api")
     fault = only_fault(orchestrator_checks())
     assert fault.check == "reachable"
     assert "secret" not in repr(fault)
-
-
-# a station
 
 
 def test_a_station_that_answers_is_good_and_nothing_moved(tmp_path: Path) -> None:
@@ -302,15 +253,12 @@ def test_a_station_that_answers_is_good_and_nothing_moved(tmp_path: Path) -> Non
 
 
 def test_a_station_that_does_not_answer_or_whose_file_is_wrong_is_a_fault_and_none_is_not(tmp_path: Path) -> None:
-    checks = station_checks(station_file(tmp_path, modbus_station(free_port())))
+    checks = station_checks(station_file(tmp_path, modbus_station(9)))
     assert {check.check for check in checks if check.state == "fault"} >= {"table", "chamber", "reader"}
     assert all(check.remedy for check in checks if check.state == "fault")
     (tmp_path / "s.toml").write_text("name = 3\n", encoding="utf-8")
     assert only_fault(station_checks(tmp_path / "s.toml")).check == "file"
     assert states(station_checks(None)) == {"file": "not configured"}
-
-
-# the host and its software
 
 
 def test_the_clock_is_what_the_kernel_says_and_a_difference_the_least_that_is_sure(
@@ -332,8 +280,6 @@ def test_this_environment_meets_the_requirements() -> None:
     checks = {check.check: check for check in software.software_checks()}
     assert checks["libraries"].state == "good"
     assert {checks[name].state for name in ("Python", "lock")} <= {"good", "warning"}
-    extras = set(metadata.metadata("tumbleline").get_all("Provides-Extra")) - software.DEVELOPMENT - {"recordings"}
-    assert all(extra in checks["optional parts"].found for extra in extras)
     assert "docs" not in checks["optional parts"].found  # builds the pages of the product, which its users read
 
 
@@ -345,10 +291,6 @@ def test_a_library_that_is_missing_or_of_another_version_is_named(
     name, held, check, state = case
     version, distributions = metadata.version, metadata.distributions
 
-    class Other:
-        def __init__(self) -> None:
-            self.name, self.version = name, held
-
     def changed(asked: str) -> str:
         if asked.lower() != name:
             return version(asked)
@@ -357,13 +299,11 @@ def test_a_library_that_is_missing_or_of_another_version_is_named(
         return held
 
     monkeypatch.setattr(software.metadata, "version", changed)
-    monkeypatch.setattr(software.metadata, "distributions", lambda: [*distributions(), *([Other()] if held else [])])
+    other = [SimpleNamespace(name=name, version=held)] if held else []
+    monkeypatch.setattr(software.metadata, "distributions", lambda: [*distributions(), *other])
     rows = {row.check: row for row in software.software_checks()}
     assert rows[check].state == state
     assert "pip install" in rows[check].remedy
-
-
-# the command
 
 
 def test_the_command_says_the_remedy_and_leaves_with_its_status(tmp_path: Path) -> None:

@@ -11,9 +11,10 @@ import pandas as pd
 import pytest
 
 from pipelines.drawing import Chart, ColourScale, Plot, PlotAxis, Trace, csv_text, plotly_figure, svg_text
-from pipelines.drawing.chart import DIVERGING, ROLES, SEQUENTIAL, density
+from pipelines.drawing.chart import ROLES, density
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.drawing.picture import picture
+from pipelines.report.run_pictures import samples_chart
 
 
 def chart() -> Chart:
@@ -52,12 +53,9 @@ def test_the_numbers_of_a_figure_are_those_of_its_csv_and_its_labels_those_of_it
 def test_the_note_of_a_chart_stands_below_its_plots() -> None:
     plain, noted = chart(), replace(chart(), note="3 of 5 are <not> drawn")
     before, after = plotly_figure(plain)["layout"], plotly_figure(noted)["layout"]
-    room = after["height"] - before["height"]
-    assert room == after["margin"]["b"] - before["margin"]["b"] > 0
+    assert after["height"] - before["height"] == after["margin"]["b"] - before["margin"]["b"] > 0
     assert after["annotations"][-1]["text"] == "3 of 5 are &lt;not&gt; drawn"
     assert ">3 of 5 are &lt;not&gt; drawn</text>" in svg_text(noted)
-    heights = [float(re.search(r'viewBox="0 0 \S+ (\S+)"', svg_text(one))[1]) for one in (plain, noted)]
-    assert heights[1] > heights[0]
 
 
 def test_names_become_no_markup_and_no_formula_of_a_spreadsheet() -> None:
@@ -85,43 +83,22 @@ def test_a_crowd_loses_no_point_and_mollweide_keeps_areas(rng: np.random.Generat
     assert np.mean((x > 0.0) & (y > 0.0)) == pytest.approx(0.25, abs=0.004)
 
 
-@pytest.mark.parametrize(("lost", "style"), [(False, "line"), (True, "points")])
-def test_samples_are_a_line_unless_one_beside_a_gap_would_be_hidden(
-    rng: np.random.Generator, *, lost: bool, style: str
-) -> None:
-    from pipelines.report.run_pictures import samples_chart
-
+def test_samples_are_a_line_unless_one_beside_a_gap_would_be_hidden(rng: np.random.Generator) -> None:
     values = rng.normal(size=(100, 3))
-    if lost:
+    for style in ("line", "points"):
+        table = pd.DataFrame(values, columns=["x", "y", "z"]).assign(time_s=np.arange(100) / 100.0)
+        traces = [trace for plot in samples_chart(table, "a dwell", "g").plots for trace in plot.traces]
+        assert [trace.style for trace in traces] == [style] * 3
+        assert np.allclose(traces[0].y, values[:, 0] - np.nanmean(values[:, 0]), equal_nan=True)
         values[40:60:2] = np.nan
-    table = pd.DataFrame(values, columns=["x", "y", "z"]).assign(time_s=np.arange(100) / 100.0)
-    chart = samples_chart(table, "a dwell", "g")
-    assert [trace.style for plot in chart.plots for trace in plot.traces] == [style] * 3
-    shown = chart.plots[0].traces[0].y
-    assert np.allclose(shown, values[:, 0] - np.nanmean(values[:, 0]), equal_nan=True)
 
 
-def contrast(one: str, other: str) -> float:
-    """Contrast of two colours (WCAG 2.2)."""
-    light = []
-    for text in (one, other):
-        parts = [int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
-        linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]
-        light.append(0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2])
-    return (max(light) + 0.05) / (min(light) + 0.05)
-
-
-def test_no_colour_of_a_scale_is_that_of_a_page_and_one_colour_of_a_legend_means_one_thing() -> None:
-    for _, colour in (*DIVERGING, *SEQUENTIAL):
-        for page in ("#ffffff", "#f4f6f8", "#22252a", "#1a2026"):
-            assert contrast(colour, page) > 1.6, (colour, page)
+def test_one_colour_of_a_legend_means_one_thing() -> None:
     apart = ("x", "y", "z", "fourth", "before", "after", "muted", "ink", "good")
     assert len({ROLES[role] for role in apart}) == len(apart)
 
 
-def test_on_narrow_screens_plots_stand_one_under_the_other_lines_are_divided_names_are_fewer_and_a_sphere_is_low() -> (
-    None
-):
+def test_on_narrow_screens_plots_stand_one_under_the_other_and_lines_names_and_spheres_fit() -> None:
     figure = plotly_figure(chart())
     wide, narrow = figure["layout"], figure["narrow"]
     assert wide["xaxis"]["domain"][1] < wide["xaxis2"]["domain"][0]
@@ -140,34 +117,17 @@ def test_on_narrow_screens_plots_stand_one_under_the_other_lines_are_divided_nam
     assert "narrow" not in plotly_figure(Chart("", (replace(plot, x=PlotAxis("time / s")),)))
 
 
-def test_names_are_turned_where_one_of_them_is_wider_than_its_place() -> None:
-    for longest, turned in (("season", False), ("own temperature coefficient", True)):
-        names = (
-            "mean",
-            "station",
-            "date",
-            longest,
-            "slot",
-            "unit",
-            "wafer",
-            "operator",
-            "supplier",
-            "firmware",
-            "batch",
-        )
-        plot = Plot("", PlotAxis("", names=names), PlotAxis("y"), (Trace("", np.arange(11.0), np.arange(11.0)),))
-        assert ("rotate(-38" in svg_text(Chart("", (plot,), height=200))) is turned
+def named_bars(*names: str) -> Chart:
+    """A low chart with a point above each name."""
+    points = Trace("", np.arange(1.0 * len(names)), np.arange(1.0 * len(names)))
+    return Chart("", (Plot("", PlotAxis("", names=names), PlotAxis("y"), (points,)),), height=200)
 
 
-def test_turned_names_are_whole_inside_the_picture() -> None:
-    names = tuple(f"effect_{'x' * 9}{k:02d}" for k in range(20))
-    text = svg_text(
-        Chart(
-            "",
-            (Plot("", PlotAxis("", names=names), PlotAxis("y"), (Trace("", np.arange(20.0), np.arange(20.0)),)),),
-            height=200,
-        )
-    )
+def test_names_are_turned_where_one_of_them_is_wider_than_its_place_and_stay_inside_the_picture() -> None:
+    others = ["mean", "station", "date", "slot", "unit", "wafer", "operator", "supplier", "firmware", "batch"]
+    assert "rotate(-38" not in svg_text(named_bars("season", *others))
+    assert "rotate(-38" in svg_text(named_bars("own temperature coefficient", *others))
+    text = svg_text(named_bars(*(f"effect_{'x' * 9}{k:02d}" for k in range(20))))
     height = float(re.search(r'viewBox="0 0 [\d.]+ ([\d.]+)"', text)[1])  # type: ignore[index]
     lowest = max(float(y) for y in re.findall(r"rotate\(-38 [\d.]+ ([\d.]+)\)", text))
     assert lowest + 14 * 6.9 * np.sin(np.radians(38.0)) < height

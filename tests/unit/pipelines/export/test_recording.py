@@ -30,12 +30,9 @@ def test_points_in_time_are_seconds_and_a_condition_with_a_gap_is_refused_by_its
     assert recording_of(table.astype({"unit_C": object}), "t").state.temperature.tolist() == [25.0, 26.0, 27.0]
     with pytest.raises(DataRejected, match="t: row 2, column 'unit_C': found -, a finite number"):
         recording_of(table.assign(unit_C=["25", "-", "27"]), "t")
-    warm = recording_of(
-        table.assign(unit_C=["25", "-", "27"]).rename(columns={"unit_C": "note"}).assign(temp_degC=25.0), "t"
-    )
-    fit: Any = SimpleNamespace(
-        run="r", effects=("scale", "bias_temperature"), coefficients=np.ones((3, 2)), nonlinear={}
-    )
+    warm = recording_of(table.drop(columns="unit_C").assign(note="-", temp_degC=25.0), "t")
+    model = ("scale", "bias_temperature")
+    fit: Any = SimpleNamespace(run="r", effects=model, coefficients=np.ones((3, 2)), nonlinear={})
     with pytest.raises(DataRejected, match=r"t: no column unit_C, .* this name \(further columns: temp_degC\)"):
         corrected(warm, fit, None)
     with pytest.raises(DataRejected, match="t: column 'x' is there twice"):

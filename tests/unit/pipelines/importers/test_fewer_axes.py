@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import lots
 import numpy as np
 import pandas as pd
 import pytest
@@ -37,18 +38,10 @@ def coefficients(folder: Path, run: str) -> dict[str, tuple[float, float]]:
 
 def test_two_positions_give_half_the_sum_and_half_the_difference(tmp_path):
     up, down = np.array([0.3520012, 0.3519993, 0.3520004]), np.array([-0.3480007, -0.3479988, -0.3480011])
-    rows = [
-        (name, volts, 1e-5, 100) for pair in zip(up, down, strict=True) for name, volts in zip("ud", pair, strict=True)
-    ]
-    pd.DataFrame(rows, columns=["position", "volts", "noise_V", "samples"]).to_csv(tmp_path / "two.csv", index=False)
-    mapped = (
-        "--map",
-        "x=volts,dwell=position,sd_x=noise_V,n=samples",
-        "--set",
-        "poses=u=+x,d=-x",
-        "--set",
-        "local_gravity_m_s2=9.80665",
-    )
+    rows = pd.DataFrame({"position": ["u", "d"] * 3, "volts": np.column_stack([up, down]).ravel()})
+    rows.assign(noise_V=1e-5, samples=100).to_csv(tmp_path / "two.csv", index=False)
+    mapped = ("--map", "x=volts,dwell=position,sd_x=noise_V,n=samples", "--set", "poses=u=+x,d=-x")
+    mapped += ("--set", "local_gravity_m_s2=9.80665")
     fit = document_of("fit", imported(tmp_path, tmp_path / "two.csv", *mapped), "--archive", tmp_path / "archive")
     assert fit["effects"] == ["bias", "scale"]  # nothing across is shown: no misalignment is pretended
     assert fit["adequate"] is None
@@ -62,17 +55,10 @@ def test_two_positions_give_half_the_sum_and_half_the_difference(tmp_path):
 @pytest.mark.slow
 def test_a_tumble_is_its_fourier_series(tmp_path):
     path, table = tilt_file(tmp_path)
-    for name in ("U [V]", "x_V"):
-        headed = table.rename(columns={"volts": name, "angle_deg": "Winkel [°]"}).assign(unit_C=25.0)
-        headed.to_csv(tmp_path / "headed.csv", index=False)
-        improved = text_of("improve", tmp_path / "headed.csv", "--yes", "--archive", tmp_path / "improved", status=1)
-        assert f"x: {name} (the one output, which follows its reference); in V" in improved
     run, archive = imported(tmp_path, path, "--map", TILT), tmp_path / "archive"
     plain = document_of("fit", run, "--archive", archive)
     assert plain["adequate"] is False
-    assert plain["missing"] == [
-        ["second_order", "cross_axis_quadratic"]
-    ]  # sin² + cos² = 1: one plane cannot tell them apart
+    assert plain["missing"] == [["second_order", "cross_axis_quadratic"]]  # sin² + cos² = 1: alike in one plane
     fit = document_of("fit", run, "--effects", "bias,scale,misalignment,second_order", "--archive", archive)
     assert fit["adequate"] is True
     found = coefficients(tmp_path, fit["run"])
@@ -85,7 +71,6 @@ def test_a_tumble_is_its_fourier_series(tmp_path):
     for name, (value, error) in found.items():
         assert value == pytest.approx(harmonic[name], abs=0.5 * error), name
         assert abs(value - truth[name]) < 4.0 * error, name
-    assert "report.html" in text_of("show", fit["run"], "--report", "--archive", archive)
     unit = json.loads(given("export", fit["run"], "--format", "json", "--archive", archive)[1])["units"][0]
     assert (unit["axes"], np.shape(unit["bias"]), np.shape(unit["response"])) == (["x"], (4, 1), (4, 1, 3))
     assert unit["response"][0][0] == pytest.approx([found["K1"][0], found["Kxy"][0], 0.0])
@@ -118,11 +103,7 @@ def test_a_slip_in_the_axes_is_refused_with_one_message(tmp_path, words, needed)
 
 
 def test_a_table_with_two_outputs_is_a_device_with_two_axes(tmp_path):
-    rng, golden = np.random.default_rng(3), np.pi * (3.0 - np.sqrt(5.0))
-    z = 1.0 - 2.0 * (np.arange(24) + 0.5) / 24
-    force = np.stack(
-        [np.sqrt(1 - z**2) * np.cos(golden * np.arange(24)), np.sqrt(1 - z**2) * np.sin(golden * np.arange(24)), z], 1
-    )
+    rng, force = np.random.default_rng(3), lots.force(lots.directions("fibonacci"))
     response = np.array([[1.01, 2e-3, -1e-3], [3e-3, 0.99, 1e-3]])
     output = force @ response.T + [0.01, -0.02] + rng.normal(0.0, 5e-6, (24, 2))
     table = pd.DataFrame({"unit": "T1", "dwell": range(24), "time_s": 30.0 * np.arange(24)})

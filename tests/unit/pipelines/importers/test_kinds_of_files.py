@@ -21,7 +21,12 @@ def points(folder: Path, head: str) -> Path:
     return path
 
 
-def test_points_of_a_sweep_are_no_record_of_samples_and_their_command_imports_them(tmp_path: Path) -> None:
+def test_points_of_a_sweep_are_no_record_of_samples_their_command_imports_them_and_says_what_they_lack(
+    tmp_path: Path,
+) -> None:
+    document = document_of("inspect", points(tmp_path, "frequency_hz,magnitude,phase_deg"), status=1)
+    assert "no magnitude uncertainty and no phase uncertainty, by which a model is judged" in document["open"][0]
+    assert "--procedure sweep" in document["command"]
     path = points(tmp_path, f"frequency_hz,magnitude,phase_deg{UNCERTAIN}")
     document = document_of("inspect", path, status=0)
     meanings = [column["meaning"] for column in document["columns"]]
@@ -32,12 +37,6 @@ def test_points_of_a_sweep_are_no_record_of_samples_and_their_command_imports_th
     assert words[:2] == ["tumbleline", "import"]
     made = document_of(*words[1:], "--archive", tmp_path / "archive", status=0)
     assert (made["points"], made["adequate"]) == (20, True)
-
-
-def test_points_that_lack_something_say_what_in_the_words_of_the_import(tmp_path: Path) -> None:
-    document = document_of("inspect", points(tmp_path, "frequency_hz,magnitude,phase_deg"), status=1)
-    assert "no magnitude uncertainty and no phase uncertainty, by which a model is judged" in document["open"][0]
-    assert "--procedure sweep" in document["command"]
 
 
 def test_means_in_poses_are_dwells_and_angles_alone_are_poses_of_a_recipe(tmp_path: Path) -> None:

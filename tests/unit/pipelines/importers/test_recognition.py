@@ -1,13 +1,10 @@
-"""Files as loggers, telephones and benches write them, and what is recognised in them: the right three columns, or none.
-
-The files are made from physics (gravity turned by a hand, rates of that turning, the field of the Earth) and know nothing of the
-recogniser. None is right where nothing in the file tells, and better than a wrong proposal.
-"""
+"""Files as loggers, telephones and benches write them, made from physics: the right three columns are recognised, or none."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,6 +20,7 @@ from pipelines.importers.recognition import Recognition, recognise
 from pipelines.importers.record import imported
 
 Rng = np.random.Generator
+Columns = dict[Any, np.ndarray]
 
 
 def accelerations(
@@ -31,79 +29,50 @@ def accelerations(
     return sensed(rng, true, scale, bias, 0.003 * scale)
 
 
-def named(columns: dict[str, np.ndarray], names: str, three: np.ndarray) -> None:
-    columns.update(dict(zip(names.split(), three.T, strict=True)))
+def three(names: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    return dict(zip(names.split(), values.T, strict=True))
 
 
-def csv(path: Path, columns: dict[str, np.ndarray], *, header: bool = True, sep: str = ",") -> Path:
-    pd.DataFrame(columns).to_csv(path, index=False, header=header, sep=sep, float_format="%.6f")
+def csv(path: Path, columns: dict) -> Path:
+    """Columns with their names, or without where these are numbers."""
+    named = isinstance(next(iter(columns)), str)
+    pd.DataFrame(columns).to_csv(path, index=False, header=named, float_format="%.6f")
     return path
 
 
 # files with an answer: file → columns of x, y, z; unit of the output; unit of time; whether rows are positions
 
 
-def logger_of_imu(rng: Rng, at: Path) -> Path:
+def logger_of_imu(rng: Rng, hand: Hand, _: Path) -> Columns:
     """Counts of a gyroscope before those of an accelerometer, time in µs since power-on, one pause of the logger."""
-    hand = Hand(rng)
-    columns = {"ustime": np.rint(2.3e9 + 1e6 * hand.time + np.where(hand.time > 40.0, 344_000.0, 0.0))}
-    named(columns, "gx gy gz", np.rint(sensed(rng, hand.rate, 1880.0, (0.02, -0.03, -0.02), 8.0)))
-    named(columns, "ax ay az", np.rint(accelerations(rng, hand.force, 16384.0)))
-    return csv(at / "a.csv", columns, sep=" ")
+    time = np.rint(2.3e9 + 1e6 * hand.time + np.where(hand.time > 40.0, 344_000.0, 0.0))
+    rates = three("gx gy gz", np.rint(sensed(rng, hand.rate, 1880.0, (0.02, -0.03, -0.02), 8.0)))
+    return {"ustime": time} | rates | three("ax ay az", np.rint(accelerations(rng, hand.force, 16384.0)))
 
 
-def board_without_header(rng: Rng, at: Path) -> Path:
-    """Tab-divided, without names: time, m/s² with a bias of half a g on z, °/s, raw magnetometer, pressure, °C; 20 Hz."""
-    hand = Hand(rng, stops=14, rate=20.0, rest_s=5.0)
-    columns = {"t": hand.time}
-    named(columns, "a b c", G * accelerations(rng, hand.force, bias=(0.0, 0.0, 0.48)))
-    named(columns, "d e f", np.degrees(sensed(rng, hand.rate, 1.0, (0.02, 0.0, 0.0), 0.005)))
-    named(columns, "g h i", np.rint(rng.normal(50.0, 30.0, (hand.n, 3))) % 65536.0)
-    columns |= {"j": np.zeros(hand.n), "k": 97.99 + 0.002 * rng.normal(size=hand.n), "l": 34.6 + 0.01 * hand.time}
-    return csv(at / "a.txt", columns, header=False, sep="\t")
-
-
-def positions_without_header(rng: Rng, at: Path) -> Path:
+def positions_without_header(rng: Rng, _: Hand, __: Path) -> Columns:
     """Means of counts in thirty positions, nothing else."""
-    means = accelerations(rng, Hand(rng, stops=30).stops, 16384.0)
-    np.savetxt(at / "a.txt", np.round(means, 3), delimiter=",", fmt="%.3f")
-    return at / "a.txt"
+    return dict(enumerate(np.round(accelerations(rng, Hand(rng, stops=30).stops, 16384.0), 3).T))
 
 
-def numbered_positions(rng: Rng, at: Path) -> Path:
-    columns = {"No": np.arange(1.0, 25.0), "Temp": np.full(24, 23.4)}
-    named(columns, "Vx Vy Vz", np.round(accelerations(rng, Hand(rng, stops=24).stops), 5))
-    return csv(at / "a.csv", columns)
-
-
-def telephone_matrix(rng: Rng, at: Path) -> Path:
-    """A MATLAB matrix under a long name, without a clock."""
-    force = G * accelerations(rng, Hand(rng, stops=30).force, bias=(-0.013, 0.0, -0.013))
-    savemat(str(at / "a.mat"), {"MobileAccData30orientationRawSample01": force})
-    return at / "a.mat"
-
-
-def matrix_with_clock(rng: Rng, at: Path) -> Path:
+def matrix_with_clock(rng: Rng, hand: Hand, at: Path) -> Path:
     """Time and words of a converter with its zero in the middle, as one matrix."""
-    hand = Hand(rng, stops=30)
     counts = np.rint(32768.0 + accelerations(rng, hand.force, 4060.0))
     savemat(str(at / "a.mat"), {"IMU0x2Dalpha": np.column_stack([hand.time + 0.03, counts])})
     return at / "a.mat"
 
 
-def bursts(rng: Rng, at: Path) -> Path:
+def bursts(rng: Rng, _: Hand, __: Path) -> Columns:
     """A buffer of eight samples each 12 ms, with temperatures of two other sensors that rest at zero."""
     hand = Hand(rng, rate=8.0 / 0.0135)
     stamp = 12.0 * (np.arange(hand.n) // 8) + 0.2 * (np.arange(hand.n) % 8) + 1.5 * (np.arange(hand.n) // 8)
     columns = {"now[ms]": 71556.0 + stamp, "AHT_tmp[C]": np.zeros(hand.n), "BMP_pres": np.zeros(hand.n)}
-    named(columns, "gx gy gz", np.degrees(sensed(rng, hand.rate, 1.0, (0.1, 0.0, 0.0), 0.05)))
-    named(columns, "ax ay az", accelerations(rng, hand.force))
-    columns["gtemp"] = 41.0 + 0.3 * np.sin(hand.time)
-    named(columns, "magx magy magz", sensed(rng, hand.field, 1.0, (5.0, 8.0, -4.0), 0.5))
-    return csv(at / "a.csv", columns)
+    columns |= three("gx gy gz", np.degrees(sensed(rng, hand.rate, 1.0, (0.1, 0.0, 0.0), 0.05)))
+    columns |= three("ax ay az", accelerations(rng, hand.force)) | {"gtemp": 41.0 + 0.3 * np.sin(hand.time)}
+    return columns | three("magx magy magz", sensed(rng, hand.field, 1.0, (5.0, 8.0, -4.0), 0.5))
 
 
-def maker_of_sensors(rng: Rng, at: Path) -> Path:
+def maker_of_sensors(rng: Rng, _: Hand, at: Path) -> Path:
     """Lines of settings, counters of 100 µs, angles in every fourth row only."""
     n = 4000
     still = G * accelerations(rng, np.tile([1.0, 0.03, -0.01], (n, 1)))
@@ -116,52 +85,43 @@ def maker_of_sensors(rng: Rng, at: Path) -> Path:
     return at / "a.txt"
 
 
-def labelled_records(rng: Rng, at: Path) -> Path:
+def labelled_records(rng: Rng, _: Hand, at: Path) -> Path:
     """Records of NumPy with a label in each, the time last; the sensor lies still."""
     n = 1500
     table = pd.DataFrame(accelerations(rng, np.tile([-0.02, 0.0, 1.03], (n, 1))), columns=["ax", "ay", "az"])
     table[["gx", "gy", "gz"]] = rng.normal(0.0, 0.1, (n, 3))
     table = table.assign(timestamp=28_902_133 + 10_000 * np.arange(n), label="Stationary")
-    kinds = {name: "<U32" if name == "label" else "<i8" if name == "timestamp" else "<f8" for name in table}
-    with (at / "a.npy").open("wb") as file:
-        np.save(file, np.array([*map(tuple, table.to_numpy())], dtype=[*kinds.items()]))
+    records = table.to_records(index=False, column_dtypes={"timestamp": "<i8", "label": "<U32"})
+    np.save(at / "a.npy", np.asarray(records))
     return at / "a.npy"
 
 
-def telephone_export(rng: Rng, at: Path) -> Path:
+def telephone_export(rng: Rng, hand: Hand, _: Path) -> Columns:
     """Acceleration beside the gravity and the linear acceleration that a telephone computes."""
-    hand = Hand(rng)
-    columns = {"time": hand.time}
-    named(columns, "gravity_x gravity_y gravity_z", G * hand.force)
-    named(columns, "linear_x linear_y linear_z", rng.normal(0.0, 0.1, (hand.n, 3)))
-    named(columns, "accelerometer_x accelerometer_y accelerometer_z", G * accelerations(rng, hand.force))
-    return csv(at / "a.csv", columns)
+    names = " ".join(f"{one}_{axis}" for one in ("gravity", "linear", "accelerometer") for axis in "xyz")
+    parts = G * hand.force, rng.normal(0.0, 0.1, (hand.n, 3)), G * accelerations(rng, hand.force)
+    return {"time": hand.time} | three(names, np.hstack(parts))
 
 
-def volts_beside_force(rng: Rng, at: Path, forces: str = "force_x force_y force_z") -> Path:
+def volts_beside_force(rng: Rng, _: Hand, __: Path, forces: str = "force_x force_y force_z") -> Columns:
     """A bench: the force that was applied, in g and without noise, before the outputs in V."""
-    true, columns = Hand(rng, stops=24).stops, {"step": np.arange(24.0)}
-    named(columns, forces, true)
-    named(columns, "out_x[V] out_y[V] out_z[V]", 0.66 * accelerations(rng, true))
-    return csv(at / "a.csv", columns)
+    true = Hand(rng, stops=24).stops
+    outputs = three("out_x[V] out_y[V] out_z[V]", 0.66 * accelerations(rng, true))
+    return {"step": np.arange(24.0)} | three(forces, true) | outputs
 
 
-def references_beside_means(rng: Rng, at: Path) -> Path:
+def references_beside_means(rng: Rng, _: Hand, __: Path) -> Columns:
     """Six faces: what each axis should read, its mean, its standard deviation, axis after axis."""
-    true, columns = np.vstack([np.eye(3), -np.eye(3)]), {}
-    means = accelerations(rng, true)
-    for k, axis in enumerate("xyz"):
-        columns |= {f"{axis}_true (g)": true[:, k], f"{axis}_mean (g)": means[:, k], f"{axis}_std": np.full(6, 0.003)}
-    return csv(at / "a.csv", columns)
+    true = np.vstack([np.eye(3), -np.eye(3)])
+    each_axis = np.stack([true, accelerations(rng, true), np.full((6, 3), 0.003)], axis=2).reshape(6, 9)
+    names = [f"{axis}_{one}" for axis in "xyz" for one in ("true (g)", "mean (g)", "std")]
+    return dict(zip(names, each_axis.T, strict=True))
 
 
 RIGHT = {
     references_beside_means: ("x_mean (g) y_mean (g) z_mean (g)", "g", "", True),
     logger_of_imu: ("ax ay az", "LSB", "us", False),
-    board_without_header: ("2 3 4", "m/s^2", "s", False),
     positions_without_header: ("1 2 3", "LSB", "", True),
-    numbered_positions: ("Vx Vy Vz", "g", "", True),
-    telephone_matrix: (" ".join(f"MobileAccData30orientationRawSample01_{k}" for k in (1, 2, 3)), "m/s^2", "", False),
     matrix_with_clock: ("IMU0x2Dalpha_2 IMU0x2Dalpha_3 IMU0x2Dalpha_4", "LSB", "s", False),
     bursts: ("ax ay az", "g", "ms", False),
     maker_of_sensors: ("Acc_X Acc_Y Acc_Z", "m/s^2", "samples", False),
@@ -171,90 +131,52 @@ RIGHT = {
 }
 
 
-# sealed: what must not be proposed
-
-
-def gyroscope_alone(rng: Rng, at: Path) -> Path:
-    hand = Hand(rng)
-    counts = np.rint(sensed(rng, hand.rate, 1880.0, (17.4,) * 3, 8.0))
-    savemat(str(at / "a.mat"), {"omega": np.column_stack([hand.time, counts])})
-    return at / "a.mat"
-
-
-def gyroscope_as_xyz(rng: Rng, at: Path) -> Path:
-    hand, columns = Hand(rng), {}
-    columns["time"] = hand.time
-    named(columns, "x y z", sensed(rng, hand.rate, 1.0, (0.01, 0.02, -0.01), 0.002))
-    return csv(at / "a.csv", columns)
-
-
-def magnetometer_alone(rng: Rng, at: Path) -> Path:
-    hand, columns = Hand(rng), {}
-    columns["time"] = hand.time
-    named(columns, "mx my mz", sensed(rng, hand.field, 1.0, (5.0, 8.0, -4.0), 0.3))
-    return csv(at / "a.csv", columns)
-
-
-def two_sensors(rng: Rng, at: Path) -> Path:
-    hand, columns = Hand(rng), {}
-    columns["time"] = hand.time
-    named(columns, "acc1_x acc1_y acc1_z", accelerations(rng, hand.force))
-    named(columns, "acc2_x acc2_y acc2_z", accelerations(rng, hand.force))
-    return csv(at / "a.csv", columns)
-
-
-def two_sensors_mixed(rng: Rng, at: Path) -> Path:
-    """x and y of one sensor, z of another that is mounted otherwise; no names."""
-    hand = Hand(rng)
-    other = accelerations(rng, hand.force)[:, [1, 2, 0]]
-    rows = np.column_stack([hand.time, accelerations(rng, hand.force)[:, :2], other[:, 0]])
-    np.savetxt(at / "a.csv", rows, delimiter=",", fmt="%.6f")
-    return at / "a.csv"
-
-
-def weather(rng: Rng, at: Path) -> Path:
+def weather(rng: Rng, _: Hand, __: Path) -> Columns:
     n = 3000
     day = np.sin(np.arange(n) / 400.0)
     places = {"T1": (20.0, 5.0), "T2": (20.3, 4.6), "T3": (19.0, 5.5)}
     air = {name: mean + swing * day + 0.01 * rng.normal(size=n) for name, (mean, swing) in places.items()}
-    return csv(at / "a.csv", {"row": np.arange(n), "t": np.arange(n)} | air)
+    return {"row": np.arange(n), "t": np.arange(n)} | air
 
 
-def reference_alone(rng: Rng, at: Path) -> Path:
-    columns = {"position": np.arange(24.0)}
-    named(columns, "ref_x ref_y ref_z", np.round(Hand(rng, stops=24).stops, 6))
-    return csv(at / "a.csv", columns)
+def two_sensors_mixed(rng: Rng, hand: Hand, _: Path) -> Columns:
+    """x and y of one sensor, z of another that is mounted otherwise; no names."""
+    one, other = accelerations(rng, hand.force), accelerations(rng, hand.force)
+    return dict(enumerate([hand.time, one[:, 0], one[:, 1], other[:, 1]]))
 
 
-def drifting_voltages(rng: Rng, at: Path) -> Path:
-    walk = 1.65 + 0.001 * np.cumsum(rng.normal(size=(4000, 3)), axis=0)
-    np.savetxt(at / "a.csv", np.column_stack([np.arange(4000) / 50.0, walk]), delimiter=",", fmt="%.6f")
-    return at / "a.csv"
+TWO = "acc1_x acc1_y acc1_z acc2_x acc2_y acc2_z"
+SEALED: dict[str, Callable[[Rng, Hand, Path], Columns]] = {  # what must not be proposed
+    "counts of a gyroscope without names": lambda rng, hand, _: dict(
+        enumerate([hand.time, *np.rint(sensed(rng, hand.rate, 1880.0, (17.4,) * 3, 8.0)).T])
+    ),
+    "a gyroscope called x, y, z": lambda rng, hand, _: (
+        {"time": hand.time} | three("x y z", sensed(rng, hand.rate, 1.0, (0.01, 0.02, -0.01), 0.002))
+    ),
+    "a magnetometer": lambda rng, hand, _: (
+        {"time": hand.time} | three("mx my mz", sensed(rng, hand.field, 1.0, (5.0, 8.0, -4.0), 0.3))
+    ),
+    "two sensors": lambda rng, hand, _: (
+        {"time": hand.time} | three(TWO, np.hstack([accelerations(rng, hand.force) for _ in "12"]))
+    ),
+    "two sensors mixed": two_sensors_mixed,
+    "weather": weather,
+    "a reference alone": lambda rng, *_: (
+        {"position": np.arange(24.0)} | three("ref_x ref_y ref_z", np.round(Hand(rng, stops=24).stops, 6))
+    ),
+    "voltages that drift": lambda rng, *_: dict(
+        enumerate([np.arange(4000) / 50.0, *(1.65 + 0.001 * np.cumsum(rng.normal(size=(3, 4000)), axis=1))])
+    ),
+    "a force called like an output": lambda rng, *more: volts_beside_force(rng, *more, "fx[g] fy[g] fz[g]"),
+    "standard deviations": lambda rng, *_: (
+        {"time": np.arange(200.0) / 10.0} | three("sd_x sd_y sd_z", 0.003 + 3e-4 * rng.normal(size=(200, 3)))
+    ),
+}
 
 
-def force_without_its_name(rng: Rng, at: Path) -> Path:
-    """Called like an output: the force of a table, whose size is one in all poses, before the outputs in V."""
-    return volts_beside_force(rng, at, "fx[g] fy[g] fz[g]")
-
-
-def deviations(rng: Rng, at: Path) -> Path:
-    columns = {"time": np.arange(200.0) / 10.0}
-    named(columns, "sd_x sd_y sd_z", 0.003 * (1.0 + 0.1 * rng.normal(size=(200, 3))))
-    return csv(at / "a.csv", columns)
-
-
-SEALED = (
-    gyroscope_alone,
-    gyroscope_as_xyz,
-    magnetometer_alone,
-    two_sensors,
-    two_sensors_mixed,
-    weather,
-    reference_alone,
-    drifting_voltages,
-    force_without_its_name,
-    deviations,
-)
+def file_of(make: Callable[[Rng, Hand, Path], Columns | Path], rng: Rng, at: Path) -> Path:
+    made = make(rng, Hand(rng), at)
+    return made if isinstance(made, Path) else csv(at / "a.csv", made)
 
 
 def axes_of(seen: Recognition) -> str:
@@ -262,10 +184,8 @@ def axes_of(seen: Recognition) -> str:
 
 
 @each(RIGHT)
-def test_the_three_columns_their_unit_and_the_clock_are_recognised(
-    write: Callable[[Rng, Path], Path], rng: Rng, tmp_path: Path
-) -> None:
-    seen = recognise([write(rng, tmp_path)])
+def test_the_three_columns_their_unit_and_the_clock_are_recognised(write: Callable, rng: Rng, tmp_path: Path) -> None:
+    seen = recognise([file_of(write, rng, tmp_path)])
     columns, unit, time, positions = RIGHT[write]
     assert axes_of(seen) == columns
     assert seen.guessed.output.meaning == unit
@@ -277,31 +197,21 @@ def test_the_three_columns_their_unit_and_the_clock_are_recognised(
         assert seen.rate_hz == pytest.approx(8.0 / 0.0135, rel=0.01)
         assert seen.guessed.column("temperature") == "gtemp"
     assert seen.gaps == 1 or write is not logger_of_imu
+    if write is references_beside_means:  # by their names; the poses are known, and it is fitted as a run is
+        means = {f"force_{axis}": f"{axis}_true (g)" for axis in "xyz"}
+        assert (means | {f"sd_{axis}": f"{axis}_std" for axis in "xyz"}).items() <= seen.keys["columns"].items()
+        assert seen.for_fit().fit == ""
 
 
 @each(SEALED)
-def test_nothing_is_proposed_where_no_three_columns_are_one_accelerometer(
-    write: Callable[[Rng, Path], Path], rng: Rng, tmp_path: Path
-) -> None:
-    seen = recognise([write(rng, tmp_path)])
+def test_nothing_is_proposed_where_no_three_columns_are_one_accelerometer(name: str, rng: Rng, tmp_path: Path) -> None:
+    seen = recognise([file_of(SEALED[name], rng, tmp_path)])
     assert axes_of(seen) == ""
     assert seen.open
     assert "x=COLUMN" in seen.import_command
-    if write is force_without_its_name:
+    if name == "a force called like an output":
         assert "2 groups" in seen.open[0]
         assert len(seen.open) == 1
-
-
-def test_the_reference_and_the_spread_of_a_table_of_means_are_recognised_by_their_names(
-    rng: Rng, tmp_path: Path
-) -> None:
-    seen = recognise([references_beside_means(rng, tmp_path)])
-    assert seen.keys is not None
-    expected = {f"force_{axis}": f"{axis}_true (g)" for axis in "xyz"} | {f"sd_{axis}": f"{axis}_std" for axis in "xyz"}
-    assert expected.items() <= seen.keys["columns"].items()
-    proposal = seen.for_fit()
-    assert proposal is not None
-    assert proposal.fit == ""  # the poses are known: it is fitted as a run is
 
 
 @each([("-- Data File Created By ActiGraph GT3X+ date format M/d/yyyy at 30 Hz  Filter Normal --", 30.0),
@@ -311,9 +221,7 @@ def test_the_reference_and_the_spread_of_a_table_of_means_are_recognised_by_thei
        ("sampled at 30 Hz\nsampled at 60 Hz", None)])  # fmt: skip
 def test_the_rate_that_stands_above_a_table_without_a_clock_is_taken(told, rng: Rng, tmp_path: Path) -> None:
     text, rate = told
-    hand, columns = Hand(rng, rate=30.0), {}
-    named(columns, "ax ay az", accelerations(rng, hand.force))
-    path = csv(tmp_path / "a.csv", columns)
+    path = csv(tmp_path / "a.csv", three("ax ay az", accelerations(rng, Hand(rng, rate=30.0).force)))
     path.write_text(f"{text}\nSerial number A1\n{path.read_text('utf-8')}", encoding="utf-8")
     seen = recognise([path])
     assert seen.rate_hz == (None if rate is None else pytest.approx(rate))
@@ -332,28 +240,22 @@ def test_a_record_that_never_rests_has_no_stops_and_a_noisy_one_at_rest_has(rng:
     )
     noisy = [0.0, 0.0, 1.0] + 0.3 * rng.normal(size=force.shape)
     for name, output, stops in (("moving", force, 0), ("noisy", noisy, 1)):
-        columns = {"time [s]": time}
-        named(columns, "ax[g] ay[g] az[g]", output + 0.002 * rng.normal(size=force.shape))
+        columns = {"time [s]": time} | three("ax[g] ay[g] az[g]", output + 0.002 * rng.normal(size=force.shape))
         seen = recognise([csv(tmp_path / f"{name}.csv", columns)])
-        assert seen.stops is not None
         assert len(seen.stops.found) == stops
         told = inspect([tmp_path / f"{name}.csv"]).document["remarks"]
         assert any("no position at rest" in text for text in told) is (stops == 0)
-        assert seen.keys is not None
         made = imported(pd.DataFrame(columns), build(seen.keys, name), name)
         assert (0 if made.dwells is None else len(made.dwells)) == stops
         assert any("are no rest" in text for text in made.remarks) is (stops == 0)
 
 
 def test_files_that_follow_one_another_are_positions_of_their_own(rng: Rng, tmp_path: Path) -> None:
-    """A file for each face, without a move at its ends."""
     paths = []
     for k, force in enumerate(np.vstack([np.eye(3), -np.eye(3)])):
-        columns = {"time [s]": np.arange(400) / 100.0}
-        named(columns, "ax[g] ay[g] az[g]", accelerations(rng, np.tile(force, (400, 1))))
-        paths.append(csv(tmp_path / f"face-{k}.csv", columns))
+        outputs = three("ax[g] ay[g] az[g]", accelerations(rng, np.tile(force, (400, 1))))
+        paths.append(csv(tmp_path / f"face-{k}.csv", {"time [s]": np.arange(400) / 100.0} | outputs))
     seen = recognise(paths, join="rows")
-    assert seen.stops is not None
     assert seen.stops.found.spans == tuple((400 * k, 400 * (k + 1)) for k in range(6))
     assert seen.import_command.endswith("--set join=rows")
 
@@ -377,8 +279,7 @@ def test_a_day_beside_the_time_of_day_marks_no_dwells(rng: Rng, tmp_path: Path) 
     hand = Hand(rng)
     stamps = pd.Timestamp("2026-03-02T23:59:30") + pd.to_timedelta(hand.time, unit="s")
     columns = {"Datum": stamps.strftime("%d.%m.%Y"), "Uhrzeit": stamps.strftime("%H:%M:%S.%f")}
-    named(columns, "ax ay az", accelerations(rng, hand.force))
-    seen = recognise([csv(tmp_path / "a.csv", columns)])
+    seen = recognise([csv(tmp_path / "a.csv", columns | three("ax ay az", accelerations(rng, hand.force)))])
     assert (seen.guessed.column("time"), seen.guessed.column("dwell")) == ("Uhrzeit", "")
 
 
@@ -396,8 +297,8 @@ def dwells_of_units(rng: Rng, scale: float = 1.0) -> pd.DataFrame:
     columns |= {"dwell": np.tile(range(3, 27), 3), "time_s": time, "duration_s": 40.0, "n": 400}
     columns |= {"since_power_s": time, "since_move_s": rng.uniform(30.0, 60.0, rows)}
     columns |= {"outer_deg": rng.uniform(0.0, 180.0, rows), "inner_deg": rng.uniform(-180.0, 180.0, rows)}
-    named(columns, "ax ay az", accelerations(rng, np.tile(Hand(rng, stops=24).stops, (3, 1)), scale))
-    named(columns, "sd_x sd_y sd_z", rng.uniform(0.001, 0.002, (rows, 3)) * scale)
+    columns |= three("ax ay az", accelerations(rng, np.tile(Hand(rng, stops=24).stops, (3, 1)), scale))
+    columns |= three("sd_x sd_y sd_z", rng.uniform(0.001, 0.002, (rows, 3)) * scale)
     columns |= {"unit_C": 25.0 + rng.uniform(size=rows), "humidity_pct": rng.uniform(40.0, 50.0, rows)}
     return pd.DataFrame(columns)
 
@@ -414,15 +315,11 @@ def test_columns_named_as_in_the_exchange_format_serials_and_numbers_of_dwells_a
     seen = recognise([tmp_path / "lot.csv"])
     assert (in_turn.keys, in_turn.rate_hz, in_turn.open) == (seen.keys, seen.rate_hz, ())
     expected = {meaning: renamed.get(name, name) for meaning, name in IN_EXCHANGE_FORMAT.items()}
-    assert seen.keys is not None
     assert seen.keys["columns"] == expected | {"x": "ax", "y": "ay", "z": "az"}
     assert (seen.keys["units"], seen.keys["rows"], seen.open) == ({"output": "g"}, "dwells", ())
     assert "--units " not in seen.import_command
-    proposal = seen.for_fit()
-    assert proposal is not None
-    assert proposal.fit == ""  # its poses are known
-    dwells = imported(file, build(proposal.keys, "t"), "lot.csv").dwells
-    assert dwells is not None
+    assert seen.for_fit().fit == ""  # its poses are known
+    dwells = imported(file, build(seen.for_fit().keys, "t"), "lot.csv").dwells
     assert sorted(set(dwells["unit"])) == ["S1", "S2", "S3"]
     assert dwells["dwell"].tolist() == [*range(3, 27)] * 3
     file.drop(columns=renamed.get("dwell", "dwell")).to_csv(tmp_path / "unnumbered.csv", index=False)
@@ -433,11 +330,8 @@ def test_labels_at_which_the_time_begins_anew_are_units_whatever_they_are_called
     file = dwells_of_units(rng).rename(columns={"unit": "Prüfling", "dwell": "Lage", "time_s": "Zeit [s]"})
     file.drop(columns=["slot", "since_power_s", "since_move_s", "duration_s"]).to_csv(tmp_path / "lot.csv", index=False)
     seen = recognise([tmp_path / "lot.csv"])
-    assert seen.keys is not None
-    found = {meaning: seen.keys["columns"].get(meaning) for meaning in ("unit", "time", "dwell")}
-    assert found == {"unit": "Prüfling", "time": "Zeit [s]", "dwell": None}
+    assert [seen.keys["columns"].get(one) for one in ("unit", "time", "dwell")] == ["Prüfling", "Zeit [s]", None]
     dwells = imported(file, build(seen.keys, "t"), "lot.csv").dwells
-    assert dwells is not None
     assert sorted(set(dwells["unit"])) == ["S1", "S2", "S3"]
     whole = file.assign(**{"Zeit [s]": np.arange(len(file)) * 60.0}).rename(columns={"Prüfling": "Kammer"})
     whole.to_csv(tmp_path / "soaks.csv", index=False)  # one clock throughout: the labels may be those of soaks
@@ -448,10 +342,10 @@ def test_labels_at_which_the_time_begins_anew_are_units_whatever_they_are_called
 def test_names_of_the_exchange_format_in_a_record_of_samples_are_no_dwells(rng: Rng, tmp_path: Path) -> None:
     hand = Hand(rng)
     columns = {"n": np.arange(hand.n), "unit": np.repeat("mg", hand.n), "time_s": hand.time}
-    columns["supply_V"] = np.full(hand.n, 3.3)
-    named(columns, "ax ay az", np.round(accelerations(rng, hand.force, 1000.0), 2))
+    columns |= three("ax ay az", np.round(accelerations(rng, hand.force, 1000.0), 2)) | {
+        "supply_V": np.full(hand.n, 3.3)
+    }
     seen = recognise([csv(tmp_path / "a.csv", columns)])
-    assert seen.keys is not None
     assert seen.keys["columns"] == {"time": "time_s", "x": "ax", "y": "ay", "z": "az", "supply": "supply_V"}
     assert "rows" not in seen.keys
     columns["unit"] = np.where(hand.time < 30.0, "S1", "S2")
@@ -468,10 +362,7 @@ def test_means_of_counts_close_to_gravity_in_mg_are_asked_about(rng: Rng, tmp_pa
 
 @each(["ax", "ay", "az"])
 def test_an_axis_that_never_changes_is_recognised_and_told(axis: str, tmp_path: Path, rng: Rng) -> None:
-    hand = Hand(rng)
-    columns = {"t": hand.time}
-    named(columns, "gx gy gz", np.rint(sensed(rng, hand.rate, 1880.0, (0.02, -0.03, -0.02), 8.0)))
-    named(columns, "ax ay az", np.rint(accelerations(rng, hand.force, 16384.0)))
+    columns = logger_of_imu(rng, Hand(rng), tmp_path)
     columns[axis] = np.full_like(columns[axis], 3698.0)
     document = inspect([csv(tmp_path / "a.csv", columns)]).document
     assert [(one["fault"], one["axis"]) for one in document["faults"]] == [("stuck_output", axis[1])]

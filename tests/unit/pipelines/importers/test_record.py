@@ -11,11 +11,26 @@ from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers import clocks
 from pipelines.importers.content import Content
 from pipelines.importers.mapping import build
-from pipelines.importers.record import imported
+from pipelines.importers.record import Imported, imported
 from pipelines.importers.stated_units import refuse_contradiction
 from pipelines.tables.dwell_table import DwellTable, state_of_table
 from schemas.errors import DataRejected, RecipeInvalid, WrongUse
 from schemas.units import STANDARD_GRAVITY_M_S2
+
+AXES = {"x": "ax", "y": "ay", "z": "az"}
+STEPS = np.arange(600)
+
+
+def of_size(rng: np.random.Generator, size: float = 1.0, rows: int = 12) -> pd.DataFrame:
+    """Means of positions with this norm, which are not whole numbers."""
+    out = rng.normal(size=(rows, 3))
+    return pd.DataFrame(size * out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
+
+
+def read(frame: pd.DataFrame, columns: dict[str, str], stated: Content | None = None, **more: object) -> Imported:
+    """The import of means in g of one unit; ``columns`` beside those of the output, other keys in ``more``."""
+    content = {"units": {"output": "g"}, "unit": "A1", "rows": "dwells", "columns": AXES | columns} | more
+    return imported(frame, build(content, "t"), "f.csv", stated)
 
 
 @each(range(8))
@@ -26,33 +41,17 @@ def test_one_frozen_dwell_of_known_pose_is_a_stuck_output(seed: int) -> None:
     # 1000 equal samples: their mean differs from them, and from the last mean, in the last digits only
     table.loc[row, f"out_{axis}"] = float(np.mean(np.full(1000, table.loc[row - 1, f"out_{axis}"]) + 1e-17))
     table.loc[row, f"sd_{axis}"] = 1e-16
-    diagnosis = diagnose(table)
-    assert [(b["fault"], b["dwells"]) for b in diagnosis["blocked_by"]] == [
-        ("stuck_output", [int(table.loc[row, "dwell"])])
-    ]
+    found = [(one["fault"], one["dwells"]) for one in diagnose(table)["blocked_by"]]
+    assert found == [("stuck_output", [int(table.loc[row, "dwell"])])]
 
 
 def test_dwells_of_a_file_in_which_an_axis_stands_still_are_refused_or_left_out(rng: np.random.Generator) -> None:
-    out = rng.normal(size=(12, 3))
-    frame = pd.DataFrame(out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
-    frame = frame.assign(sx=1e-3, sy=1e-3, sz=1e-3)
+    frame, spreads = of_size(rng).assign(sx=1e-3, sy=1e-3, sz=1e-3), {"sd_x": "sx", "sd_y": "sy", "sd_z": "sz"}
     frame.loc[7, "sy"] = 0.0
-    columns = {"x": "ax", "y": "ay", "z": "az", "sd_x": "sx", "sd_y": "sy", "sd_z": "sz"}
-    content = {"columns": columns, "units": {"output": "g"}, "unit": "A1", "rows": "dwells"}
     with pytest.raises(DataRejected, match=r"axis y is constant in dwell 'dwell 7' \(row 8\).*1 such dwells"):
-        imported(frame, build(content, "t"), "f.csv")
-    assert len(imported(frame, build({**content, "faulty": "leave-out"}, "t"), "f.csv").dwells) == 11
-    assert len(imported(frame, build({**content, "faulty": "keep"}, "t"), "f.csv").dwells) == 12
-
-
-def test_the_unit_that_a_file_states_for_the_time_of_its_dwells_counts(rng: np.random.Generator) -> None:
-    out = rng.normal(size=(12, 3))
-    frame = pd.DataFrame(out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
-    frame = frame.assign(when=60_000.0 * np.arange(12))
-    content = {**CONTENT, "columns": {"time": "when", "x": "ax", "y": "ay", "z": "az"}, "rows": "dwells"}
-    dwells = imported(frame, build(content, "t"), "f.csv", Content(frame, units={"when": "ms"})).dwells
-    assert dwells is not None
-    np.testing.assert_allclose(dwells["time_s"], 60.0 * np.arange(12))
+        read(frame, spreads)
+    assert len(read(frame, spreads, faulty="leave-out").dwells) == 11
+    assert len(read(frame, spreads, faulty="keep").dwells) == 12
 
 
 @each({"2026-03-29 00:55": "forward", "2026-10-25 00:30": "back", "2026-10-28 00:30": ""}.items())
@@ -61,30 +60,26 @@ def test_local_times_over_a_change_of_the_clock_are_told_and_right_where_the_zon
 ) -> None:
     start, jump = clock
     moments = pd.date_range(start, periods=90, freq="60s", tz="UTC").tz_convert("Europe/Berlin")
-    stamps = moments.strftime("%d.%m.%Y %H:%M:%S")
-    out = rng.normal(size=(90, 3))
-    frame = pd.DataFrame(out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
-    columns = {"time": "when", "x": "ax", "y": "ay", "z": "az"}
-    content = {**CONTENT, "columns": columns, "rows": "dwells"}
-    for when in (stamps, moments.tz_localize(None)):
+    frame, time = of_size(rng, rows=90), {"time": "when"}
+    for when in (moments.strftime("%d.%m.%Y %H:%M:%S"), moments.tz_localize(None)):
         told = f"the times jump {jump} by an hour before row"
         try:
-            remarks = imported(frame.assign(when=when), build(content, "t"), "f.csv").remarks
+            remarks = read(frame.assign(when=when), time).remarks
         except DataRejected as refused:
             assert jump == "back"
             remarks = (str(refused),)
         assert [told in remark and "--set zone=NAME, for instance Europe/Berlin" in remark for remark in remarks] == (
             [True] if jump else []
         )
-        right = imported(frame.assign(when=when), build({**content, "zone": "Europe/Berlin"}, "t"), "f.csv")
+        right = read(frame.assign(when=when), time, zone="Europe/Berlin")
         assert right.remarks == ()
         np.testing.assert_allclose(right.dwells["time_s"], 60.0 * np.arange(90))
     if jump == "forward":
         frame["when"] = moments.tz_convert("UTC").tz_localize(None) + pd.Timedelta("1h")
         with pytest.raises(DataRejected, match=r"row 6: 2026-03-29 02:00:00 does not exist in Europe/Berlin"):
-            imported(frame, build({**content, "zone": "Europe/Berlin"}, "t"), "f.csv")
+            read(frame, time, zone="Europe/Berlin")
     with pytest.raises(RecipeInvalid, match=r"zone: no zone 'Europe/Berln'; did you mean Europe/Berlin"):
-        build({**content, "zone": "Europe/Berln"}, "t")
+        read(frame, time, zone="Europe/Berln")
 
 
 def test_one_pose_is_judged_by_bias_and_its_temperature(rng: np.random.Generator) -> None:
@@ -95,26 +90,13 @@ def test_one_pose_is_judged_by_bias_and_its_temperature(rng: np.random.Generator
     assert default_model(one.assign(unit_C=25.0)) == ["bias"]
 
 
-CONTENT = {"columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "units": {"output": "g"}, "unit": "A1"}
-N = 600
-
-
-def record(time, name: str = "t") -> pd.DataFrame:
-    rng = np.random.default_rng(8)
-    frame = pd.DataFrame(0.002 * rng.normal(size=(N, 3)) + [0.0, 0.6, 0.8], columns=["ax", "ay", "az"])
-    frame.insert(0, name, time)
-    return frame
-
-
 def seconds(time, claimed: str = "", name: str = "t", **units: str):
-    units_ = {"output": "g"} | ({"time": claimed} if claimed else {})
-    how = build({**CONTENT, "columns": {**CONTENT["columns"], "time": name}, "units": units_}, "t")
-    table = record(time, name)
-    recording = imported(table, how, "f.csv", Content(table, (), units))
+    """Times of a record of samples, and what is remarked; ``claimed`` by the user, ``units`` stated by the file."""
+    out = 0.002 * np.random.default_rng(8).normal(size=(STEPS.size, 3)) + [0.0, 0.6, 0.8]
+    table = pd.DataFrame(out, columns=["ax", "ay", "az"]).assign(**{name: time})
+    stated = {"output": "g"} | ({"time": claimed} if claimed else {})
+    recording = read(table, {"time": name}, Content(table, (), units), rows="samples", units=stated)
     return recording.samples["time_s"].to_numpy(), recording.remarks
-
-
-STEPS = np.arange(N)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +121,7 @@ def test_the_unit_of_a_counter_is_recognised_and_said(time, name: str, stated: d
     assert any("time in " in remark and f"{rate:.4g} Hz" in remark for remark in remarks)
 
 
-def test_times_in_a_doubtful_or_another_unit_than_claimed_are_asked_about_refused_or_remarked_upon() -> None:
+def test_times_in_a_doubtful_or_another_unit_than_claimed_are_asked_about_refused_or_remarked_upon(rng) -> None:
     for step in (1, 2, 1000, 500_000):
         with pytest.raises(WrongUse, match=r"steps of .* Hz in .* Hz in .*add --unit-of time="):
             seconds(STEPS * step)
@@ -149,6 +131,9 @@ def test_times_in_a_doubtful_or_another_unit_than_claimed_are_asked_about_refuse
     assert any("CHECK THE UNIT OF TIME" in remark for remark in seconds(STEPS * 10_000, "s")[1])
     # a unit is read from a name and not from a letter
     assert [clocks.recognised(STEPS * 1.0, n).unit for n in ("time_ms", "s", "SampleTimeFine")] == ["ms", "", ""]
+    frame = of_size(rng).assign(when=60_000.0 * np.arange(12))  # of dwells the unit that the file states counts
+    dwells = read(frame, {"time": "when"}, Content(frame, units={"when": "ms"})).dwells
+    np.testing.assert_allclose(dwells["time_s"], 60.0 * np.arange(12))
 
 
 STAMPS = pd.Timestamp("2026-03-01T23:59:58") + pd.to_timedelta(STEPS * 10, unit="ms")
@@ -187,40 +172,27 @@ def test_standard_deviations_of_no_output_or_in_another_unit_than_theirs_are_ref
         build({"columns": {"x": "a", "sd_y": "b"}, "units": {"output": "V"}, "axes": ["x"]}, "t")
 
 
-@pytest.mark.parametrize("rows", ["dwells", "samples"])
-@pytest.mark.parametrize("name", ["column", "mapped"])
-def test_recorded_quantities_of_a_file_are_kept_as_they_are_stated(name: str, rows: str, rng) -> None:
-    quantities = [row for row in RECORDED if row.mapped]
-    file = of_size(rng, 1.0).assign(**{row.label: rng.integers(1, 9, 12).astype(float) for row in quantities})
-    columns = IN_COUNTS["columns"] | {"dwell": "no"} | {getattr(row, name): row.label for row in quantities}
-    content = IN_COUNTS | {"columns": columns, "units": {"output": "g"}, "rows": rows, "rate_hz": 1.0}
-    dwells = imported(file.assign(no=range(12)), build(content, "t"), "f.csv").dwells
-    assert dwells is not None
-    for row in quantities:
-        np.testing.assert_array_equal(dwells[row.column], file[row.label])
-
-
-def of_size(rng: np.random.Generator, size: float) -> pd.DataFrame:
-    """Means of twelve positions with this norm, which are not whole numbers."""
-    out = rng.normal(size=(12, 3))
-    return pd.DataFrame(size * out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
-
-
-IN_COUNTS = {"columns": {"x": "ax", "y": "ay", "z": "az"}, "units": {"output": "LSB"}, "unit": "A1"}
+@each([(name, rows) for name in ("column", "mapped") for rows in ("dwells", "samples")])
+def test_recorded_quantities_of_a_file_are_kept_as_they_are_stated(row: tuple[str, str], rng) -> None:
+    name, rows = row
+    quantities = [one for one in RECORDED if one.mapped]
+    file = of_size(rng).assign(no=range(12), **{one.label: rng.integers(1, 9, 12).astype(float) for one in quantities})
+    columns = {"dwell": "no"} | {getattr(one, name): one.label for one in quantities}
+    dwells = read(file, columns, rows=rows, rate_hz=1.0).dwells
+    for one in quantities:
+        np.testing.assert_array_equal(dwells[one.column], file[one.label])
 
 
 def test_means_of_counts_need_not_be_whole_numbers_but_where_there_are_fewer_a_g_than_converters_have(
     rng: np.random.Generator,
 ) -> None:
-    found = imported(of_size(rng, 1033.0), build({**IN_COUNTS, "rows": "dwells"}, "t"), "f.csv")
+    counts = {"units": {"output": "LSB"}, "rate_hz": 1.0}
+    found = read(of_size(rng, 1033.0), {}, **counts)
     assert found.out_unit == "LSB"
     assert [one for one in found.remarks if "the norm of the output is 1033, as gravity in mg; LSB was given" in one]
     for size, rows in ((1.01, "dwells"), (9.8, "dwells"), (1033.0, "samples")):
         with pytest.raises(DataRejected, match="are not whole numbers, counts are needed"):
-            imported(of_size(rng, size), build({**IN_COUNTS, "rows": rows, "rate_hz": 1.0}, "t"), "f.csv")
-
-
-AS_LABELS = "labels only"
+            read(of_size(rng, size), {}, rows=rows, **counts)
 
 
 @pytest.mark.parametrize(
@@ -236,56 +208,34 @@ AS_LABELS = "labels only"
     ],
 )
 def test_dwells_have_the_numbers_of_the_file_where_these_number_them(labels, numbers, remark: str, rng) -> None:
-    file = of_size(rng, 1.0).head(6).assign(no=labels, serial=["A1"] * 3 + ["B1"] * 3)
-    columns = IN_COUNTS["columns"] | {"dwell": "no", "unit": "serial"}
-    content = {"columns": columns, "units": {"output": "g"}, "rows": "dwells"}
-    found = imported(file, build(content, "t"), "f.csv")
-    assert found.dwells is not None
+    file = of_size(rng, rows=6).assign(no=labels, serial=["A1"] * 3 + ["B1"] * 3)
+    found = read(file, {"dwell": "no", "unit": "serial"}, unit="")
     assert found.dwells["dwell"].tolist() == numbers
     assert found.dwells["pose"].tolist() == [str(one) for one in labels]
-    assert [one for one in found.remarks if AS_LABELS in one and remark in one] or not remark
-    assert remark or not [one for one in found.remarks if AS_LABELS in one]
+    told = [one for one in found.remarks if "labels only" in one]
+    assert [remark in one for one in told] == [True] * bool(remark)
 
 
 def test_labelled_samples_have_the_numbers_of_their_labels(rng: np.random.Generator) -> None:
-    file = pd.concat([of_size(rng, 1.0).head(3) for _ in range(8)], ignore_index=True).assign(
-        no=np.repeat([2, 3, 7, 9], 6)
-    )
-    columns = IN_COUNTS["columns"] | {"dwell": "no"}
-    content = IN_COUNTS | {
-        "columns": columns,
-        "units": {"output": "g"},
-        "rate_hz": 10.0,
-        "poses": {"3": "+x", "9": "+z"},
-    }
-    found = imported(file, build({**content, "local_gravity_m_s2": 9.81}, "t"), "f.csv")
-    assert found.dwells is not None
-    assert found.dwells["dwell"].tolist() == [3, 9]
+    file = pd.concat([of_size(rng, rows=3)] * 8, ignore_index=True).assign(no=np.repeat([2, 3, 7, 9], 6))
+    stated = {"poses": {"3": "+x", "9": "+z"}, "local_gravity_m_s2": 9.81}
+    assert read(file, {"dwell": "no"}, rows="samples", rate_hz=10.0, **stated).dwells["dwell"].tolist() == [3, 9]
 
 
-@pytest.mark.parametrize(
-    ("stated", "gravity"), [({}, 1.0), ({"local_gravity_m_s2": 9.81}, 9.81 / STANDARD_GRAVITY_M_S2)]
-)
-@pytest.mark.parametrize("rows", ["dwells", "samples"])
-def test_angles_of_a_table_become_the_force_that_a_diagnosis_of_the_file_reads(stated, gravity, rows: str, rng) -> None:
+@each([(stated, rows) for stated in ({}, {"local_gravity_m_s2": 9.81}) for rows in ("dwells", "samples")])
+def test_angles_of_a_table_become_the_force_that_a_diagnosis_of_the_file_reads(row: tuple[dict, str], rng) -> None:
+    stated, rows = row
+    gravity = stated.get("local_gravity_m_s2", STANDARD_GRAVITY_M_S2) / STANDARD_GRAVITY_M_S2
     angles = {"outer_deg": rng.uniform(-180.0, 180.0, 12), "inner_deg": [180.0, *rng.uniform(-180.0, 180.0, 11)]}
-    file = of_size(rng, 1.0).assign(no=range(12), **angles)
-    columns = IN_COUNTS["columns"] | {"dwell": "no", "outer": "outer_deg", "inner": "inner_deg"}
+    file = of_size(rng).assign(no=range(12), **angles)
     if rows == "samples":
         file = pd.concat([file, file.assign(inner_deg=file["inner_deg"] - 360.0)]).sort_values("no", ignore_index=True)
-    content = IN_COUNTS | {"columns": columns, "units": {"output": "g"}, "rows": rows, "rate_hz": 1.0} | stated
-    dwells = imported(file, build(content, "t"), "f.csv").dwells
-    assert dwells is not None
+    columns = {"dwell": "no", "outer": "outer_deg", "inner": "inner_deg"}
+    dwells = read(file, columns, rows=rows, rate_hz=1.0, **stated).dwells
     plain = pd.DataFrame({"unit": "A1", "dwell": range(12), "time_s": np.arange(12.0), **angles})
     reference, state = state_of_table(DwellTable(plain.assign(out_x=0.0, out_y=0.0, out_z=0.0)))
     assert reference == "angles"
     np.testing.assert_allclose(dwells[[*FORCE_COLUMNS]], gravity * state.force[0], atol=1e-12)
-
-
-def test_a_force_that_a_file_states_beside_angles_is_kept(rng: np.random.Generator) -> None:
-    file = of_size(rng, 1.0).assign(outer_deg=0.0, inner_deg=0.0, fx=0.6, fy=0.0, fz=0.8)
-    named = {"outer": "outer_deg", "inner": "inner_deg", "force_x": "fx", "force_y": "fy", "force_z": "fz"}
-    content = {**IN_COUNTS, "columns": IN_COUNTS["columns"] | named, "units": {"output": "g"}, "rows": "dwells"}
-    dwells = imported(file, build(content, "t"), "f.csv").dwells
-    assert dwells is not None
-    np.testing.assert_array_equal(dwells[[*FORCE_COLUMNS]], np.tile([0.6, 0.0, 0.8], (12, 1)))
+    force = {"force_x": "fx", "force_y": "fy", "force_z": "fz"}  # one that is stated beside the angles is kept
+    kept = read(file.assign(fx=0.6, fy=0.0, fz=0.8), columns | force, rows=rows, rate_hz=1.0, **stated).dwells
+    np.testing.assert_array_equal(kept[[*FORCE_COLUMNS]], np.tile([0.6, 0.0, 0.8], (12, 1)))

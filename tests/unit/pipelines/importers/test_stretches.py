@@ -40,7 +40,6 @@ def test_stops_made_by_mechanics_are_found_and_motion_is_none(row: str) -> None:
 
 
 def test_a_knock_does_not_part_a_rest_and_two_positions_without_a_move_are_two() -> None:
-    """A rest that a loud moment interrupts is one stop where its mean stays; positions that touch are parted by their means."""
     rng, t = np.random.default_rng(5), np.arange(0.0, 12.0, 0.02)
     still = np.array([0.0, 0.0, 1.0]) + 1e-3 * rng.standard_normal((len(t), 3))
     assert kept(still, 50.0, 1.0) == 1
@@ -49,7 +48,6 @@ def test_a_knock_does_not_part_a_rest_and_two_positions_without_a_move_are_two()
 
 
 def test_the_end_of_a_slow_move_in_a_hand_is_no_stop_of_its_own() -> None:
-    """Sixteen stretches of such records were taken for stops: in the pose of the next one, half a second before the knock."""
     name = "slow moves of 4 to 8 s"
     number = list(ROWS).index(name)
     for k in range(20):

@@ -1,6 +1,7 @@
 """Text as devices write it: preambles, integer headers, decimal commas, byte-order marks, units in a line of their own."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,6 @@ from pipelines.importers.mapping import build
 from pipelines.importers.record import imported
 from pipelines.importers.text_table import content
 from pipelines.importers.unit_check import unsigned_bits
-from pipelines.stages.unknown_poses.fit import norms_fitted
 from pipelines.tables.norms import refuse_one_pose
 from schemas.errors import DataRejected
 
@@ -44,6 +44,11 @@ CASES = {
 def read(tmp_path: Path, text: str, encoding: str = "utf-8") -> Content:
     (tmp_path / "a.csv").write_bytes(text.encode(encoding))
     return files.read_content(tmp_path / "a.csv")[0]
+
+
+def inspected(tmp_path: Path, text: str) -> dict[str, Any]:
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    return inspect([tmp_path / "a.csv"]).document
 
 
 @each(CASES)
@@ -80,7 +85,6 @@ def test_units_in_a_line_broken_rows_short_rows_and_rows_of_another_width_are_wh
 
 
 def test_a_line_break_in_a_quoted_field_of_every_row_is_part_of_the_field() -> None:
-    """It ended in a traceback of the csv library while the other dividers were tried."""
     rows = "".join(f'0.{k},1.{k},"moved\nagain"\n' for k in range(1, 7))
     table = content(f"t,x,note\n{rows}", "x.csv").table
     assert list(table.columns) == ["t", "x", "note"]
@@ -112,22 +116,16 @@ def sheet(form: str, divider: str, rows: list[list[float]], *, quoted: bool = Fa
     ],
 )  # fmt: skip
 def test_thousands_with_a_separator_are_counts(text: str, remark: str, tmp_path: Path) -> None:
-    """16,384 in quotes was read as 16.384 and taken for m/s²."""
     found = read(tmp_path, text)
     np.testing.assert_allclose(found.table[["ax", "ay", "az"]].to_numpy(dtype=float), COUNTS)
     np.testing.assert_allclose(found.table["t"], 0.01 * np.arange(len(COUNTS)))
     assert remark in "; ".join(found.remarks)
 
 
-@pytest.mark.parametrize(
-    "rows",
-    [
-        [[9.807, 1.204, -2.113], [9.811, 1.206, 2.113]] * 20,  # three decimals, none below one
-        [[0.123, 1.002, -1.004], [1.123, 1.002, -1.004]] * 20,
-    ],
-)
-@pytest.mark.parametrize("decimal", [".", ","])
-def test_three_decimals_are_no_thousands(rows: list[list[float]], decimal: str, tmp_path: Path) -> None:
+@each([(first, decimal) for first in (9.807, 0.123) for decimal in ".,"])
+def test_three_decimals_are_no_thousands(row: tuple[float, str], tmp_path: Path) -> None:
+    first, decimal = row  # also where none is below one
+    rows = [[first, 1.204, -2.113], [first + 1.0, 1.206, 2.113]] * 20
     text = sheet(".3f", ";", rows)
     text = "\n".join(f"{k}{line[line.index(';') :]}" if k else line for k, line in enumerate(text.splitlines()))
     found = read(tmp_path, text.replace(".", decimal))
@@ -143,12 +141,10 @@ def test_minutes_and_seconds_of_a_spreadsheet_go_on_over_the_hour() -> None:
 def test_a_row_of_a_summary_is_left_out_where_gaps_may_be_and_rows_that_stand_twice_are_remarked_upon(
     rng: np.random.Generator,
 ) -> None:
-    """The message asked for `--set gaps=split`, which was given."""
     table = recordings.table(recordings.recording(rng))
     last = pd.DataFrame({"t": ["mean"], "ax": [0.0], "ay": [0.0], "az": [0.0]})
     summed = pd.concat([table.astype(object), last], ignore_index=True)
     recording = imported(summed, build(PLAIN | {"gaps": "split"}, "t"), "a.csv")
-    assert recording.samples is not None
     assert len(recording.samples) == len(table)
     twice = pd.concat([table.iloc[:501], table.iloc[500:]], ignore_index=True)
     assert "CHECK THE ROWS: 1 rows" in "; ".join(imported(twice, build(PLAIN, "t"), "a.csv").remarks)
@@ -156,13 +152,11 @@ def test_a_row_of_a_summary_is_left_out_where_gaps_may_be_and_rows_that_stand_tw
 
 
 def test_words_that_lost_their_sign_are_refused_with_what_to_subtract(rng: np.random.Generator, tmp_path: Path) -> None:
-    """They were imported, and the fit said NOT ADEQUATE."""
     table = recordings.table(recordings.recording(rng, positions=18))
     wrong = table.assign(**{name: np.round(table[name]) % 65536.0 for name in ("ax", "ay", "az")})
     with pytest.raises(DataRejected, match=r"signed words of 16 bits .* subtract 65536"):
         imported(wrong, build(PLAIN, "t"), "a.csv")
-    wrong.to_csv(tmp_path / "a.csv", index=False)
-    assert any("without their sign" in one for one in inspect([tmp_path / "a.csv"]).document["open"])
+    assert any("without their sign" in one for one in inspected(tmp_path, wrong.to_csv(index=False))["open"])
 
 
 @each([(12, 2048, 400), (12, 2048, 2000), (16, 32768, 4000), (10, 512, 100)])
@@ -175,41 +169,31 @@ def test_a_converter_with_its_zero_in_the_middle_lost_no_sign(
     assert unsigned_bits(counts) == 0
 
 
-def test_a_sheet_of_positions_is_proposed_as_dwells_and_unknown_axes_stand_in_capitals(tmp_path: Path) -> None:
-    """The proposed command asked for the rate of samples."""
-    (tmp_path / "a.csv").write_text("Position;X;Y;Z\nX up;0,98;0,01;0,02\nX down;-1,01;0,01;0,02\nY up;0,0;1,0;0,0\n")
-    document = inspect([tmp_path / "a.csv"]).document
+def test_a_sheet_of_positions_is_proposed_as_dwells(tmp_path: Path) -> None:
+    document = inspected(tmp_path, "Position;X;Y;Z\nX up;0,98;0,01;0,02\nX down;-1,01;0,01;0,02\nY up;0,0;1,0;0,0\n")
     assert document["open"] == []
     assert "dwell=Position" in document["command"]
     assert document["command"].endswith("--set rows=dwells")
-    (tmp_path / "a.csv").write_text("time,gyro\n" + "".join(f"{0.01 * k:.2f},0.{(7 * k) % 10}\n" for k in range(20)))
-    document = inspect([tmp_path / "a.csv"]).document
-    assert "x=COLUMN,y=COLUMN,z=COLUMN" in document["command"]
 
 
-@pytest.mark.parametrize(
-    ("heads", "mapped"),
-    [
-        (("a",), "x=a --unit-of output=UNIT,time=s --units S --set axes=x"),
-        (("acc_x", "acc_z"), "x=acc_x,z=acc_z --unit-of output=UNIT,time=s --units S --set axes=x,z"),
-        (("U_V", "sd_V"), "x=U_V --unit-of output=V,time=s --units S --set axes=x"),
-        (("temp", "az"), "temperature=temp,z=az --unit-of output=UNIT,time=s --units S --set axes=z"),
-    ],
-)
-def test_a_record_of_one_axis_or_two_is_proposed_by_its_columns(
-    heads: tuple[str, ...], mapped: str, tmp_path: Path, rng: np.random.Generator
-) -> None:
-    table = pd.DataFrame(rng.normal(1.0, 1e-3, (400, len(heads))), columns=list(heads))
-    table.insert(0, "time", 0.02 * np.arange(400))
-    table.to_csv(tmp_path / "S.csv", index=False)
-    document = inspect([tmp_path / "S.csv"]).document
-    assert document["command"].endswith(f"--map time=time,{mapped}")
+FEWER = {
+    "a": "x=a --unit-of output=UNIT,time=s --units a --set axes=x",
+    "acc_x acc_z": "x=acc_x,z=acc_z --unit-of output=UNIT,time=s --units a --set axes=x,z",
+    "U_V sd_V": "x=U_V --unit-of output=V,time=s --units a --set axes=x",
+    "temp az": "temperature=temp,z=az --unit-of output=UNIT,time=s --units a --set axes=z",
+}
+
+
+@each(FEWER)
+def test_a_record_of_one_axis_or_two_is_proposed_by_its_columns(heads: str, tmp_path: Path, rng) -> None:
+    table = pd.DataFrame(rng.normal(1.0, 1e-3, (400, len(heads.split()))), columns=heads.split())
+    document = inspected(tmp_path, table.assign(time=0.02 * np.arange(400)).to_csv(index=False))
+    assert document["command"].endswith(f"--map time=time,{FEWER[heads]}")
     assert any("fewer than three axes" in one and "--set axes" in one for one in document["open"])
     assert not any("were not recognised" in one for one in document["open"])
 
 
 def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Generator) -> None:
-    """Dwells with times that ran back were refused by the diagnosis as a fault of the data."""
     one = recordings.recording(rng, directions=recordings.FACES, moves=False)
     table = recordings.table(one, t=one.time)
     table["part"] = ""
@@ -222,21 +206,7 @@ def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Gene
     assert "the clock restarts 5 times" in "; ".join(recording.remarks)
 
 
-def test_counts_far_from_zero_are_fitted(rng: np.random.Generator) -> None:
-    """100 counts per g about 2048: the outputs change by a tenth of their norm."""
-    force = rng.standard_normal((30, 3))
-    force /= np.linalg.norm(force, axis=1, keepdims=True)
-    table = pd.DataFrame(
-        2048.0 + 100.0 * force + rng.normal(0.0, 0.01, force.shape), columns=["out_x", "out_y", "out_z"]
-    )
-    table = table.assign(unit="A", dwell=range(30), time_s=np.arange(30) * 10.0, out_unit="LSB")
-    assert norms_fitted(table, None, ("bias", "scale", "misalignment")).fit.fit.coefficients[0, 0, 0] == pytest.approx(
-        2048.0, abs=0.1
-    )
-
-
 def test_a_sensor_that_was_not_turned_is_told_so_and_what_to_do(rng: np.random.Generator) -> None:
-    """A chamber cycle was told to add poses."""
     still = np.array([0.1, -0.05, -9.7]) + rng.normal(0.0, 0.05, (30, 3))
     with pytest.raises(NotIdentified, match=r"was not turned.*--set face=FACE"):
         refuse_one_pose(still)
@@ -247,7 +217,7 @@ SERIALS = ("007", "7", "1e5", "100000", "NaN", "NA", "TRUE", "0x1F", "1234567890
 
 
 @each(["unit", "Part"])
-def test_serial_numbers_stay_as_they_were_written(column: str, tmp_path: Path) -> None:
+def test_serial_numbers_stay_as_they_were_written_also_in_several_files(column: str, tmp_path: Path) -> None:
     for names in (("007",), ("1e5",), ("NaN",), SERIALS):
         rows = [f"{name};{k};{k},5;{0.1 * k:.1f};0.2;9.8".replace(".", ",") for name in names for k in range(4)]
         (tmp_path / "a.csv").write_text("\n".join([f"{column};no;t;x;y;z", *rows]) + "\n")
@@ -257,10 +227,7 @@ def test_serial_numbers_stay_as_they_were_written(column: str, tmp_path: Path) -
             "units": {"output": "m/s^2", "time": "s"}, "rows": "dwells",
         }, "a.csv")  # fmt: skip
         assert set(imported(found.table, mapping, "a.csv", content=found).units) == set(names)
-
-
-def test_serial_numbers_of_several_files_stay_as_they_were_written(tmp_path: Path) -> None:
     for name, serial in (("a.csv", "007"), ("b.csv", "12")):
-        (tmp_path / name).write_text(f"part,t,x\n{serial},0,0.1\n{serial},1,0.2\n")
+        (tmp_path / name).write_text(f"{column},t,x\n{serial},0,0.1\n{serial},1,0.2\n")
     joined, _, _ = sources.read([tmp_path / "a.csv", tmp_path / "b.csv"], join="rows", time="t")
-    assert list(map(str, joined.named("part"))) == ["007", "007", "12", "12"]
+    assert list(map(str, joined.named(column))) == ["007", "007", "12", "12"]

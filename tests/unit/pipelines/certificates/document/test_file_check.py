@@ -3,10 +3,12 @@
 import base64
 import hashlib
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
 
@@ -15,7 +17,7 @@ from capture_double import AT_ROOM, small_run
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, utils
-from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, pkcs12
 from each import each
 from in_process import document_of, given, refused, text_of, typed_document
 from laboratory import laboratory_file
@@ -92,9 +94,6 @@ def wrong(document: dict) -> dict[str, str]:
     }
 
 
-# second programs ------------------------------------------------------------------------------------------------------
-
-
 def own_implementation_accepts(signature: bytes, key: SigningKey) -> bool:
     """XMLDSig by hand: digest of the canonical object, ECDSA over the canonical SignedInfo."""
     root = etree.fromstring(signature)
@@ -106,10 +105,9 @@ def own_implementation_accepts(signature: bytes, key: SigningKey) -> bool:
     assert method == "http://www.w3.org/2006/12/xml-c14n11", method
     public = key.certificate.public_key()
     assert isinstance(public, ec.EllipticCurvePublicKey)
+    pair = utils.encode_dss_signature(r, s)
     try:
-        public.verify(
-            utils.encode_dss_signature(r, s), etree.tostring(signed, method="c14n"), ec.ECDSA(hashes.SHA256())
-        )
+        public.verify(pair, etree.tostring(signed, method="c14n"), ec.ECDSA(hashes.SHA256()))
     except InvalidSignature:
         return False
     digest = base64.b64decode(signed.findtext(f".//{{{DSIG}}}DigestValue"))
@@ -117,41 +115,33 @@ def own_implementation_accepts(signature: bytes, key: SigningKey) -> bool:
 
 
 def schema_accepts(document: bytes) -> bool:
-    from importlib.resources import files
-
     folder = files("pipelines.certificates.document") / "schemas"
     rules = xmlschema.XMLSchema(str(folder / "dcc.xsd"), locations={"https://ptb.de/si": str(folder / "SI_Format.xsd")},
                                 allow="local")  # fmt: skip
     return rules.is_valid(BytesIO(document))
 
 
-# files as they were issued --------------------------------------------------------------------------------------------
-
-
 def test_signed_files_are_accepted_alone_with_the_archive_and_by_second_programs(
     issued: Issued, tmp_path: Path
 ) -> None:
-    files = [issued.folder / f"A1_1.{end}" for end in ("pdf", "xml", "xml.sig")]
-    document = checked(*files, "--trust", issued.trust, status=0)
+    own = [issued.folder / f"A1_1.{end}" for end in ("pdf", "xml", "xml.sig")]
+    assert not wrong(checked(own[0], status=1))  # a good signature of anybody proves nothing
+    told = "nothing shows where the file comes from; give --trust FILE"
+    assert told in text_of("verify", own[0], status=1)
+    document = checked(*own, "--trust", issued.trust, status=0)
     assert [one["certificate"] for one in document["files"]] == ["A1/1"] * 3
     assert all(one["proven_by"] == ["signature"] for one in document["files"])
-    assert openssl_accepts(files[0].read_bytes(), issued.trust, tmp_path)
-    assert own_implementation_accepts(files[2].read_bytes(), issued.key)
-    assert schema_accepts(files[1].read_bytes())
-    words = (issued.folder / "A1_1.pdf", "--trust", issued.trust, "--archive", issued.run.archive.root)
+    assert openssl_accepts(own[0].read_bytes(), issued.trust, tmp_path)
+    assert own_implementation_accepts(own[2].read_bytes(), issued.key)
+    assert schema_accepts(own[1].read_bytes())
+    words = (own[0], "--trust", issued.trust, "--archive", issued.run.archive.root)
     checks = {one["check"]: one for one in checked(*words, status=0)["files"][0]["checks"]}
     assert checks["archive"]["state"] == checks["state"]["state"] == "good"
     assert int(checks["archive"]["message"].split()[0]) > 20
     assert "not proven by the archive: laboratory: Example Sensor Works" in checks["laboratory"]["message"]
     Archive(tmp_path / "archive").prepare()  # of somebody else, who receives the certificate
-    document = checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=0)
+    document = checked(own[0], "--trust", issued.trust, status=0)
     assert "has no certificate A1/1" in json.dumps(document)
-
-
-def test_a_good_signature_of_anybody_proves_nothing(issued: Issued) -> None:
-    assert not wrong(checked(issued.folder / "A1_1.pdf", status=1))
-    printed = text_of("verify", issued.folder / "A1_1.pdf", status=1)
-    assert "nothing shows where the file comes from; give --trust FILE" in printed
 
 
 def test_an_unsigned_xml_is_proven_by_the_archive_with_the_laboratorys_file_and_an_unsigned_pdf_is_not(
@@ -169,9 +159,6 @@ def test_an_unsigned_xml_is_proven_by_the_archive_with_the_laboratorys_file_and_
     assert not wrong(document)
     assert "nothing shows that its pages are unchanged" in json.dumps(document)
     checked(folder / "A1_1.xml", status=1)
-
-
-# alterations of the XML ------------------------------------------------------------------------------------------------
 
 
 def altered(xml: bytes) -> list[tuple[str, bytes]]:
@@ -194,13 +181,14 @@ def altered(xml: bytes) -> list[tuple[str, bytes]]:
     return out
 
 
-def accepted_alterations(made: Issued, folder: Path, step: int, patch: pytest.MonkeyPatch) -> tuple[int, list[str]]:
-    """How many alterations of a certificate were tried, and those that are accepted by the archive, or by it and the file.
-
-    The archive stays as it is: what it says is read once.
-    """
+@pytest.mark.slow
+def test_no_altered_text_or_attribute_is_accepted_by_the_archive(
+    made: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Alone or with the laboratory's file. The archive stays as it is: what it says is read once."""
     archive = Archive(made.run.archive.root)
-    every = altered((made.folder / "unsigned" / "A1_1.xml").read_bytes())[::step]
+    every = altered((made.folder / "unsigned" / "A1_1.xml").read_bytes())
+    assert len(every) > 290
     who, composed, known = read_laboratory(made.folder / "laboratory.toml"), {}, Ledger(archive).calibrations("A1")
 
     def once(run: Run, one: Calibration, all_known: list[Calibration], by: LaboratoryFile) -> CertificateContent:
@@ -209,33 +197,20 @@ def accepted_alterations(made: Issued, folder: Path, step: int, patch: pytest.Mo
             composed[key] = compose(run, one, all_known, by)
         return composed[key]
 
-    patch.setattr(archive_comparison, "compose", once)
-    patch.setattr(Ledger, "calibrations", lambda _self, serial: known if serial == "A1" else [])
-    path = folder / "altered.xml"
-    names: list[str] = []
+    monkeypatch.setattr(archive_comparison, "compose", once)
+    monkeypatch.setattr(Ledger, "calibrations", lambda _self, serial: known if serial == "A1" else [])
+    path = tmp_path / "altered.xml"
+    accepted: list[str] = []
     for name, data in every:
         path.write_bytes(data)
         against = (Against((), archive, demanded=True), Against((), archive, True, who))
-        names += [name for one in against if check_file(path, one).accepted]
-    return len(every), names
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("step", "least"), [(41, 6), pytest.param(1, 290, marks=pytest.mark.slow)])
-def test_no_altered_text_or_attribute_is_accepted_by_the_archive(
-    made: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int, least: int
-) -> None:
-    count, accepted = accepted_alterations(made, tmp_path, step, monkeypatch)
-    assert count > least
+        accepted += [name for one in against if check_file(path, one).accepted]
     assert accepted == []
 
 
 FORGERIES = (
     (b"no device was measured", b"a device was measured", ""),
     (b"SIMULATED: ", b"Measured: ", ""),
-    (b"The results relate only", b"This accredited laboratory says: the results relate only", ""),
-    (b"JCGM 100:2008", b"ISO 16063-11", ""),
-    (b"temperature of the chamber", b"temperature of the item, too", ""),
     (b"guard", b"no guard", ""),
     (b"Example Sensor Works", b"Accredited Sensor Works", "speaks of accreditation"),
 )
@@ -262,9 +237,6 @@ def test_a_name_that_was_changed_is_never_proven_and_found_with_the_laboratorys_
     assert "customer: Somebody Else Ltd" in json.dumps(checked(*words, status=1))
     found = wrong(checked(*words, "--laboratory", made.folder / "laboratory.toml", status=1))
     assert "the file says 'Somebody Else Ltd', the archive 'Example Drones Ltd'" in found["archive"]
-
-
-# forgeries ------------------------------------------------------------------------------------------------------------
 
 
 def changed_digit(xml: bytes) -> bytes:
@@ -306,9 +278,8 @@ def test_what_is_added_after_signing_is_found(issued: Issued, tmp_path: Path) ->
         writer.write(out)
         assert out.getvalue().startswith(signed)
         path.write_bytes(out.getvalue())
-        assert (
-            "something was added after signing" in wrong(checked(path, "--trust", issued.trust, status=1))["signature"]
-        )
+        found = wrong(checked(path, "--trust", issued.trust, status=1))
+        assert "something was added after signing" in found["signature"]
         assert not openssl_accepts(out.getvalue(), issued.trust, tmp_path)
 
 
@@ -317,8 +288,6 @@ def test_a_second_signature_of_the_receiver_leaves_the_first_good(issued: Issued
     from pyhanko.sign import PdfSignatureMetadata, PdfSigner, SimpleSigner
 
     receiver = made_key(ec.generate_private_key(ec.SECP256R1()))
-    from cryptography.hazmat.primitives.serialization import NoEncryption, pkcs12
-
     pair = pkcs12.serialize_key_and_certificates(None, receiver.key, receiver.certificate, None, NoEncryption())
     out, path = BytesIO(), issued.folder / "A1_1.pdf"
     signer = SimpleSigner.load_pkcs12_data(pair, other_certs=[], passphrase=None)
@@ -402,9 +371,6 @@ def test_an_xml_that_the_schema_does_not_allow_is_found_as_by_the_second_program
     assert states["schema"] == "not checked"
 
 
-# states of the ledger -------------------------------------------------------------------------------------------------
-
-
 def test_revoked_amended_and_unknown_certificates_are_told_by_the_archive(issued: Issued, tmp_path: Path) -> None:
     shutil.copytree(str(issued.run.archive.root), tmp_path / "copy")
     archive = Archive(tmp_path / "copy")
@@ -413,14 +379,12 @@ def test_revoked_amended_and_unknown_certificates_are_told_by_the_archive(issued
     certify(Ledger(archive), archive.run(issued.run.id), ["A2"], months=6, reason="validity corrected")
     revoked = wrong(checked(issued.folder / "A1_1.pdf", *words, status=1))
     assert set(revoked) == {"state"}
-    assert revoked["state"].startswith("revoked on ")
-    assert revoked["state"].endswith("dropped on the floor")
+    assert re.fullmatch(r"revoked on .*dropped on the floor", revoked["state"])
     amended = wrong(checked(issued.folder / "A2_1.xml", *words, status=1))
     assert "amended and replaced by certificate A2/2" in amended["state"]
     shutil.rmtree(tmp_path / "copy" / "calibrations")
-    assert (
-        "has no certificate A1/1 of unit A1" in wrong(checked(issued.folder / "A1_1.xml", *words, status=1))["archive"]
-    )
+    unknown = wrong(checked(issued.folder / "A1_1.xml", *words, status=1))
+    assert "has no certificate A1/1 of unit A1" in unknown["archive"]
 
 
 @pytest.mark.slow
@@ -448,9 +412,6 @@ def test_a_certificate_superseded_by_a_later_run_is_told_and_the_later_one_stays
     # as found: what the earlier coefficients made of these readings on the day of issue stays said
     words = (tmp_path / "A1_2.xml", "--archive", later.archive.root, "--laboratory", who)
     assert checked(*words, status=0)["files"][0]["proven_by"] == ["archive"]
-
-
-# whom the receiver trusts ---------------------------------------------------------------------------------------------
 
 
 def test_a_certificate_of_an_authority_vouches_for_the_laboratories_that_it_named(issued: Issued, made: Issued) -> None:
