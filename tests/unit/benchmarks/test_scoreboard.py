@@ -1,7 +1,6 @@
 """The comparison of two checkouts by their outcomes on the same cases."""
 
 from benchmarks.scoreboard.__main__ import rows
-from benchmarks.scoreboard.beds import Bed
 
 
 def outcomes(name: str, *hits: bool) -> dict[tuple[str, ...], dict[str, bool]]:
@@ -21,10 +20,3 @@ def test_a_row_is_worse_or_better_by_more_cases_than_chance_would_change() -> No
     assert (row["verdict"], row["n"], row["other n"], row["p"]) == ("", 3, 2, 1.0)
     table, _ = rows(outcomes("wrong fresh: warm_up", True), None)
     assert (table[0]["rarer is better"], table[0]["hits"], table[0]["n"]) == (True, 1, 1)
-
-
-def test_the_seeds_of_two_names_are_apart() -> None:
-    bed = Bed("worlds", "hidden", ("a", "b"), 8)
-    seeds = {name: {seed for _, each, seed in bed.cases(3, 1.0) if each == name} for name in bed.names}
-    assert not seeds["a"] & seeds["b"]
-    assert [len(list(bed.cases(3, share))) for share in (1.0, 0.5, 0.0)] == [16, 8, 2]
