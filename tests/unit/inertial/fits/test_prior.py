@@ -28,11 +28,8 @@ def estimates(
     rng: np.random.Generator, units: int = UNITS, lot: float = 0.2, off: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of a lot of that family with errors of 0.5, ``off`` from its mean in the bias, and their covariances."""
-    values = (
-        rng.standard_normal((units, 3, P))
-        + lot * rng.standard_normal((3, P))
-        + 0.5 * rng.standard_normal((units, 3, P))
-    )
+    own, of_lot, error = (rng.standard_normal(shape) for shape in ((units, 3, P), (3, P), (units, 3, P)))
+    values = own + lot * of_lot + 0.5 * error
     values[..., 0] += off
     return values, np.broadcast_to(0.25 * np.eye(P), (units, 3, P, P))
 
@@ -54,14 +51,6 @@ def test_it_is_the_fit_of_the_observations_and_the_prior_together(rng: np.random
     np.testing.assert_allclose(found.covariance, np.linalg.inv(columns.T @ columns + root.T @ root), rtol=1e-9)
     of_prior = found.covariance @ root.T @ root @ found.covariance
     np.testing.assert_allclose(found.share, np.diagonal(of_prior) / np.diagonal(found.covariance), rtol=1e-9)
-
-
-def test_a_prior_of_no_precision_is_none(rng: np.random.Generator) -> None:
-    values, covariance = estimates(rng)
-    found = combined(values, covariance, np.full((3, P), 7.0), np.zeros((3, P, P)))
-    np.testing.assert_allclose(found.coefficients, values)
-    np.testing.assert_allclose(found.covariance, covariance)
-    assert not found.share.any()
 
 
 def test_lots_of_the_family_have_its_prior(rng: np.random.Generator) -> None:
@@ -116,9 +105,8 @@ def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rn
     precision = np.diag([1.0, 4.0, 1.0, 0.25]) / (1e-5) ** 2
     error = np.full(out.shape, WHITE)
     alone = fit_lot_with_wander(EFFECTS, state, out, error, used=used)
-    found = fit_lot_with_wander(
-        EFFECTS, state, out, error, used=used, believed=lambda t, c: combined(t, c, mean, precision)
-    )
+    with_prior = {"used": used, "believed": lambda t, c: combined(t, c, mean, precision)}
+    found = fit_lot_with_wander(EFFECTS, state, out, error, **with_prior)
     kernels = wander_kernels(time, used)
     shares = (alone.flicker_share, alone.walk_share)
     whole = np.eye(n) + sum(s * k for s, k in zip(shares, kernels, strict=True))
@@ -130,9 +118,7 @@ def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rn
         gain = both @ rows[used].T @ inside
         theta = out[:, used, axis] @ gain.T + both @ precision @ mean[axis]
         np.testing.assert_allclose(found.fit.coefficients[:, axis], theta, rtol=1e-7, atol=1e-11)
-        np.testing.assert_allclose(
-            found.fit.covariance[:, axis], np.broadcast_to(both, (UNITS, P, P)), rtol=1e-6, atol=1e-16
-        )
+        np.testing.assert_allclose(found.fit.covariance[:, axis], [both] * UNITS, rtol=1e-6, atol=1e-16)
         np.testing.assert_allclose(found.fit.residuals[..., axis], out[..., axis] - theta @ rows.T, atol=1e-10)
         take = np.eye(n)[~used]
         take[:, used] -= rows[~used] @ gain

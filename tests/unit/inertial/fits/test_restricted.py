@@ -11,11 +11,8 @@ from inertial.fits.wander import wander_kernels
 def series(rng: np.random.Generator, blocks: int = 4, n: int = 40) -> Series:
     time = np.cumsum(rng.uniform(10.0, 40.0, n))
     h = np.concatenate([np.ones((blocks, 3, n, 1)), rng.normal(size=(blocks, 3, n, 3))], axis=-1)
-    z = (
-        1e5 * h.sum(axis=-1)
-        + rng.normal(size=(blocks, 3, n))
-        + 0.3 * np.cumsum(rng.normal(size=(blocks, 3, n)), axis=-1)
-    )
+    white, steps = rng.normal(size=(2, blocks, 3, n))
+    z = 1e5 * h.sum(axis=-1) + white + 0.3 * np.cumsum(steps, axis=-1)
     return Series(h, np.zeros((blocks, 3, n, 0)), z, rng.uniform(0.9, 1.1, n), wander_kernels(time))
 
 

@@ -78,13 +78,10 @@ STEP = SequenceStep(0.1, 0.2, 25.0)
 
 
 def test_equal_steps_in_a_row_are_one_with_their_number_and_one_after_the_devices_were_off_stands_apart() -> None:
-    for steps, repeats, off in (
-        ((STEP, STEP, replace(STEP, inner=0.3), STEP), [2, 1, 1], [None] * 3),
-        ((STEP, STEP, replace(STEP, off=600.0), STEP, STEP), [2, 1, 2], [None, 600.0, None]),
+    pair = ("warm_up", "aging_log")
+    made = Proposal(1.0, 30.0, pair, kinds=("poses",), steps=(), pair=pair, minutes=12.0, settled=1.0)
+    for steps, told in (
+        ((STEP, STEP, replace(STEP, inner=0.3), STEP), [(2, None), (1, None), (1, None)]),
+        ((STEP, STEP, replace(STEP, off=600.0), STEP, STEP), [(2, None), (1, 600.0), (2, None)]),
     ):
-        rivals_ = ("warm_up", "aging_log")
-        rows = rows_of(
-            Proposal(1.0, 30.0, rivals_, kinds=("poses",), steps=steps, pair=rivals_, minutes=12.0, settled=1.0)
-        )
-        assert [row["repeats"] for row in rows] == repeats
-        assert [row.get("off_s") for row in rows] == off
+        assert [(row["repeats"], row.get("off_s")) for row in rows_of(replace(made, steps=steps))] == told
