@@ -22,11 +22,9 @@ def recorded(kind, damping, noise, rng, seconds=5.0):
     if kind == "random":
         x = rng.standard_normal(2 * n)
     else:
-        lasting = int(0.9 * n)
-        t = np.arange(lasting) / RATE_HZ
-        x = np.zeros(2 * n)
-        chirp = signal.chirp(t, 5.0, t[-1], 3000.0, method="log") * signal.windows.tukey(lasting, 0.02)
-        x[n // 2 + n // 20 : n // 2 + n // 20 + lasting] = chirp
+        t = np.arange(int(0.9 * n)) / RATE_HZ
+        chirp = signal.chirp(t, 5.0, t[-1], 3000.0, method="log") * signal.windows.tukey(t.size, 0.02)
+        x = np.pad(chirp, (n // 2 + n // 20, 2 * n - t.size - n // 2 - n // 20))
     y = np.fft.irfft(np.fft.rfft(x) * truth(np.fft.rfftfreq(2 * n, 1.0 / RATE_HZ), damping), 2 * n)
     inside = slice(n // 2, n // 2 + n)
     return x[inside], y[inside] + noise * rng.standard_normal(n)

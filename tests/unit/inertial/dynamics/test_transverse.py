@@ -36,14 +36,9 @@ def test_pulls_over_the_supply_and_over_the_angle(rng: np.random.Generator) -> N
         output = size * np.cos(angle - turn) + 0.01 * rng.normal() + 5e-5 * rng.normal(size=angle.size)
         across = fit_transverse(np.cos(angle), np.sin(angle), output, np.full(angle.size, 5e-5))
         away = (across.direction_deg - np.degrees(turn) + 180.0) % 360.0 - 180.0
-        pulls.append(
-            (
-                (one.slope_g_V - zero / 12.0) / one.slope_error_g_V,
-                (one.sensitivity[4] - gain / 12.0) / one.sensitivity_error[4],
-                (across.value - size) / across.error,
-                away / across.direction_error_deg,
-            )
-        )
+        off = (one.slope_g_V - zero / 12.0, one.sensitivity[4] - gain / 12.0, across.value - size, away)
+        stated = (one.slope_error_g_V, one.sensitivity_error[4], across.error, across.direction_error_deg)
+        pulls.append(np.divide(off, stated))
     assert np.all(np.abs(np.std(pulls, axis=0, ddof=1) - 1.0) < 0.12)
 
 
@@ -84,9 +79,8 @@ def test_a_curve_symmetric_about_the_first_supply_has_its_departure_and_a_slope(
 
 def test_no_transverse_sensitivity_gives_an_upper_limit_and_no_direction(rng: np.random.Generator) -> None:
     angle = np.radians(np.arange(0.0, 360.0, 45.0))
-    fits = [
-        fit_transverse(np.cos(angle), np.sin(angle), 1e-5 * rng.normal(size=8), np.full(8, 1e-5)) for _ in range(300)
-    ]
+    across, error = (np.cos(angle), np.sin(angle)), np.full(8, 1e-5)
+    fits = [fit_transverse(*across, 1e-5 * rng.normal(size=8), error) for _ in range(300)]
     assert sum(one.low > 0.0 for one in fits) <= 10  # 1.1 % expected
     assert all((one.direction_error_deg == 180.0) == (one.low == 0.0) for one in fits)
     with pytest.raises(NotIdentified, match="turn over a whole circle"):
