@@ -1,4 +1,4 @@
-"""Small modules of the science: frames and poses, operators, roots, correction and static intervals."""
+"""Small modules of the science: frames and poses, operators, roots, correction, static intervals, positions of a motion."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from each import each
 from scipy import optimize
 
 from inertial import frames, operators
+from inertial.change_of_level import several_levels
 from inertial.correction import correct, remaining_step
 from inertial.roots import root
 from inertial.state import State
@@ -110,3 +111,10 @@ def test_static_intervals_are_those_that_were_made_and_a_record_that_never_moves
             assert start + length - 60 < b <= start + length
     intervals = find(rng.normal(size=(5000, 3)), 100.0)
     assert (intervals.start.tolist(), intervals.stop.tolist()) == ([0], [5000])
+
+
+def test_pieces_near_the_shortest_are_a_motion_and_longer_ones_are_positions(rng: np.random.Generator) -> None:
+    steps = rng.normal(size=(40, 3))
+    for samples, positions in ((6, 1), (25, 40)):
+        record = np.repeat(steps, samples, axis=0) + 0.001 * rng.normal(size=(40 * samples, 3))
+        assert several_levels(record) == positions

@@ -41,7 +41,6 @@ def run_of(count: int = 40, units: int = 3, *, powered: float = 900.0) -> State:
 
 
 def switched_off(state: State, off: float, count: int = 30) -> State:
-    """The same with the devices off for ``off`` s, and two opposed poses in turn afterwards."""
     first = SequenceStep(*UP, 25.0, off=off)
     return extended(state, [first, *(SequenceStep(*(DOWN, UP)[k % 2], 25.0) for k in range(count - 1))])
 
@@ -107,7 +106,6 @@ def test_steps_after_a_history_begin_when_it_ends_where_the_station_still_stands
 
 
 def diagnosed(state: State, bias: np.ndarray, rng: np.random.Generator):
-    """The diagnosis of ideal devices but for a bias by dwell, with a microgram of noise."""
     shape = (*state.time.shape, 3)
     output = state.force + bias[..., None] + 1e-6 * rng.standard_normal(shape)
     lot = Lot(state, output, np.full(shape, 1e-6), np.broadcast_to(np.eye(3), (shape[0], 3, 3)))

@@ -22,7 +22,6 @@ def drawn(rng: np.random.Generator) -> recordings.Recording:
 
 
 def stands_still(one: recordings.Recording, rng: np.random.Generator) -> bool:
-    """Whether an axis that stands still for one dwell is found, and where."""
     axis, (start, stop) = int(rng.integers(3)), one.spans[int(rng.integers(len(one.spans)))]
     broken = one.output.copy()
     broken[start:stop, axis] = broken[start, axis]
@@ -30,7 +29,6 @@ def stands_still(one: recordings.Recording, rng: np.random.Generator) -> bool:
 
 
 def words_are_torn(one: recordings.Recording, rng: np.random.Generator) -> bool:
-    """Whether torn words are found although every dwell has them."""
     power = 256.0 if one.noise * 8.0 < 256.0 else 512.0
     axis = int(rng.integers(3))
     wrong = rng.random(len(one.output)) < rng.uniform(0.06, 0.11)

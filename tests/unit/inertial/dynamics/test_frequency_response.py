@@ -74,12 +74,11 @@ def test_channels_of_two_rates_and_a_late_start_give_the_same_response():
     assert np.max(np.abs(np.log(got.h1 / truth(got.frequency, 0.6))[shown])) < 0.03
 
 
-@pytest.mark.parametrize(
-    ("y", "said"), [(np.random.default_rng(1).standard_normal(50_000), "in no band"), (np.ones(30), "record longer")]
-)
-def test_an_output_that_does_not_follow_is_refused(y, said):
-    with pytest.raises(NotIdentified, match=said):
-        frequency_response((np.random.default_rng(2).standard_normal(50_000), RATE_HZ), (y, RATE_HZ))
+def test_an_output_that_does_not_follow_is_refused():
+    x, other = np.random.default_rng(2).standard_normal((2, 50_000))
+    for y, said in ((other, "in no band"), (np.ones(30), "record longer")):
+        with pytest.raises(NotIdentified, match=said):
+            frequency_response((x, RATE_HZ), (y, RATE_HZ))
 
 
 @pytest.mark.parametrize("departure", [0.0, 4e-5, -2e-4])

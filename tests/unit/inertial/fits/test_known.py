@@ -21,7 +21,6 @@ def test_looks_grow_from_the_first_to_before_the_last() -> None:
 
 @pytest.mark.parametrize("dof", [12, 300])
 def test_a_run_that_ends_at_the_first_look_within_its_guard_seldom_has_a_larger_noise(dof: int) -> None:
-    """Looks at growing data: at any of them the true noise is beyond the guard of the estimated one in at most 5 %."""
     counts = [dof + k for k in looks_at(10, 100)]
     noise = np.random.default_rng(5).standard_normal((LOTS, counts[-1]))
     wrong = np.zeros(LOTS, dtype=bool)

@@ -6,7 +6,7 @@ import pytest
 from each import each
 
 from inertial import poses
-from inertial.correction import correct, predict, station_change
+from inertial.correction import station_change
 from inertial.errors import MissingInput, NotIdentified, UnknownEffect
 from inertial.fits.linear import felt_force, fit_lot
 from inertial.frames import force_from_angles
@@ -113,13 +113,3 @@ def test_a_plan_that_confuses_coefficients_is_refused_with_their_names_in_any_pi
     heat[MANY - 1] = 30.0
     with pytest.raises(NotIdentified, match="bias"):
         fit_lot(WARM, State(force=state.force, time=state.time, temperature=heat), out)
-
-
-def test_correction_undoes_the_model_with_its_nonlinearity(rng):
-    state, output = state_and_output(rng, noise=0.0)
-    curved = output + 1e-3 * state.force**3 + 5e-4 * state.force[..., [1, 2, 0]] * state.force
-    model = (*THERMAL, "third_order", "cross_coupling")
-    fit = fit_lot(model, state, curved)
-    corrected = correct(fit.effects, state, curved, fit.coefficients, fit.nonlinear)
-    modelled = predict(fit.effects, state, fit.coefficients, fit.nonlinear)
-    assert np.abs(corrected - state.force).max() < 1.5 * np.abs(curved - modelled).max() + 1e-9

@@ -54,7 +54,6 @@ def test_it_is_the_fit_of_the_observations_and_the_prior_together(rng: np.random
 
 
 def test_lots_of_the_family_have_its_prior(rng: np.random.Generator) -> None:
-    """Nulls: units that do not fit are below one in a hundred, widened lots below one in twenty."""
     priors = [judged(family(), NAMES, *estimates(rng)) for _ in range(300)]
     assert np.mean([~prior.fits for prior in priors]) < 0.01
     assert np.mean([bool(prior.widened) for prior in priors]) < 0.05
@@ -94,7 +93,6 @@ def test_heavy_tails_keep_units_that_normal_ones_would_lose(rng: np.random.Gener
 
 
 def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rng: np.random.Generator) -> None:
-    """Coefficients, covariance and residuals of dwells left out, against dense matrices at the noise that the fit found."""
     state: State = posed(np.tile(poses.plan("fibonacci24"), (2, 1)), 30.0)
     n, used = 48, np.arange(48) < 40
     time = np.broadcast_to(state.time, n)
@@ -130,7 +128,6 @@ def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rn
 
 
 def test_own_earlier_calibrations_take_the_place_of_the_family(rng: np.random.Generator) -> None:
-    """Units far from the family's mean are judged by themselves; one that changed meanwhile has no prior."""
     values, covariance = estimates(rng, 4)
     values[:2] += 30.0
     values[2] -= 30.0

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import made_worlds as _  # noqa: F401
 import numpy as np
-import pytest
 
 from inertial import effects
 from inertial.criticism.classes import EffectClass, Member
@@ -62,16 +61,6 @@ def test_a_kink_that_may_move_is_not_promised_as_far_away_as_one_that_may_not() 
     noise = wide.covariance.rescaled(pair.noise, pair.covariance)
     fixed = residual_squares(Model(wide, [*pair.rest, group.members[1].term]), predictions(pair, wide), noise)[0]
     assert free < 0.5 * fixed * pair.weight / pair.variance
-
-
-@pytest.mark.slow
-def test_what_is_proposed_parts_the_rivals_when_it_is_measured() -> None:
-    """One run of the benchmark `python benchmarks/worlds part`, with a generator that the proposal knows nothing of."""
-    outcome = part.followed(("cubic on 18, faint", 9100))[1]
-    assert outcome["ended"] == "open"
-    made = outcome["proposals"][0]
-    assert made["parted"]
-    assert made["added"] == pytest.approx(1.0, abs=0.3)
 
 
 STEP = SequenceStep(0.1, 0.2, 25.0)

@@ -3,6 +3,7 @@
 import made_noise as generate
 import numpy as np
 import pytest
+from each import each
 from long_suites import mostly_slow
 from scipy.stats import chi2
 
@@ -74,13 +75,10 @@ def test_nis_and_nees_of_its_own_model_lie_in_their_bounds(rng: np.random.Genera
     assert 0.97 < np.mean([c.nis for c in nis]) < 1.03
 
 
-@pytest.mark.parametrize(
-    ("white", "sd", "stated"),
-    [(0.3, 1.0, "too small"), (3.0, 1.0, "too large"), (1.0, 0.2, "too small"), (1.0, 5.0, "too large")],
-)
-def test_a_wrong_model_of_the_noise_is_not_consistent(white, sd, stated, rng):
-    right = one_process(2e-5, 1e-4, 100.0)
-    wrong = one_process(2e-5 * white, 1e-4 * sd, 100.0)
+@each([(0.3, 1.0, "too small"), (3.0, 1.0, "too large"), (1.0, 0.2, "too small"), (1.0, 5.0, "too large")])
+def test_a_wrong_model_of_the_noise_is_not_consistent(row, rng):
+    white, sd, stated = row
+    right, wrong = one_process(2e-5, 1e-4, 100.0), one_process(2e-5 * white, 1e-4 * sd, 100.0)
     output = processes(rng, right, 1, 1000, 1.0)[0] + 2e-5 * rng.standard_normal((1000, 3))
     estimate = track(wrong, np.arange(1000.0), output, np.zeros((1000, 3)), np.full(1000, np.nan), 1.0)
     assert estimate.consistency.stated == stated

@@ -20,8 +20,6 @@ from inertial.noise.measurands import walk_kernel
 from inertial.noise.navigation import PER_G, navigation_error
 from inertial.noise.psd import allan_variance as variance_of_spectrum
 from inertial.noise.psd import one_sided
-from stations.plant.noise import UnitNoise
-from stations.plant.preset import load_preset
 
 
 def test_spectrum_and_allan_variance_say_the_same() -> None:
@@ -40,15 +38,6 @@ def test_the_spectrum_is_that_of_scipy_signal(count: int, segment: int) -> None:
     spectrum = one_sided(x, 50.0, segment=segment)
     np.testing.assert_allclose(spectrum.frequency, frequency, rtol=1e-12)
     np.testing.assert_allclose(spectrum.density, density, rtol=1e-9, atol=1e-14)
-
-
-def test_the_error_of_a_dwell_is_the_allan_deviation_at_its_length():
-    preset = load_preset("SF1500").model_copy(update={"rate_random_walk_ug": 0.0})
-    record = UnitNoise(preset, [np.random.default_rng(3)]).sample(60_000, 20.0)[:, 0, :].T
-    curve = overlapping(1e6 * record, 20.0)
-    at = int(np.argmin(np.abs(curve.tau - 10.0)))
-    said = DwellNoise(preset.sampled_density_ug(10.0), preset.bias_instability_ug).error(float(curve.tau[at]))
-    assert np.mean(curve.deviation[:, at]) == pytest.approx(said, rel=0.15)
 
 
 def test_a_walk_has_its_closed_forms_a_whitener_makes_white_and_dwells_end_where_wander_begins():

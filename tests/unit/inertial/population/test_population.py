@@ -6,6 +6,7 @@ Shares of 4000 series a case: `python benchmarks/noise_verdicts.py series`.
 import independent_noise as made
 import numpy as np
 import pytest
+from each import each
 from long_suites import mostly_slow
 
 from inertial.population.capability import cpk, shape_of
@@ -146,11 +147,9 @@ def test_a_series_that_stands_still_changes_as_seldom_as_is_said(n: int, memory:
     assert np.sum(p < 1e-3) <= 2
 
 
-@pytest.mark.parametrize(
-    ("n", "at", "memory", "size", "least"),
-    [(40, 20, 0.0, 4.0, 0.85), (100, 50, 0.0, 2.0, 0.9), (120, 70, 0.0, 2.5, 0.85), (120, 70, 0.6, 6.0, 0.85)],
-)
-def test_a_step_is_told_where_it_is(n: int, at: int, memory: float, size: float, least: float) -> None:
+@each([(40, 20, 0.0, 4.0, 0.85), (100, 50, 0.0, 2.0, 0.9), (120, 70, 0.0, 2.5, 0.85), (120, 70, 0.6, 6.0, 0.85)])
+def test_a_step_is_told_where_it_is(row: tuple[int, int, float, float, float]) -> None:
+    n, at, memory, size, least = row
     moved = made.autoregressive(np.random.default_rng(20_261_124), 40, n, memory) + size * (np.arange(n) >= at)
     assert np.mean([any(abs(c.first - at) <= 3 for c in change_points(one)) for one in moved]) >= least
 
