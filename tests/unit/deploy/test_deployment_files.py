@@ -35,10 +35,8 @@ MOST_EXPOSED = 2.0  # as systemd-analyze counts: 10 is a service without any pro
 COMPOSE = yaml.safe_load((DEPLOY / "compose.yaml").read_text(encoding="utf-8"))
 PLANT = yaml.safe_load((DEPLOY / "compose.plant.yaml").read_text(encoding="utf-8"))
 SERVICES = COMPOSE["services"]
-BOUND = {
-    "init": True, "read_only": True, "cap_drop": ["ALL"], "security_opt": ["no-new-privileges:true"], "mem_limit": "4g",
-    "pids_limit": 512,
-}  # fmt: skip
+BOUND = {"init": True, "read_only": True, "cap_drop": ["ALL"], "mem_limit": "4g", "pids_limit": 512}
+BOUND |= {"security_opt": ["no-new-privileges:true"]}
 ENDING = ("register", "backup")  # containers of one command
 PAGES = {
     name: (DEPLOY / f"{name}.md").read_text(encoding="utf-8") for name in ("README", "one-pc", "plant", "containers")

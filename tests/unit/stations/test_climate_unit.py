@@ -1,4 +1,4 @@
-"""The climate unit of the simulated station: legs, what it has reached, and what stops it."""
+"""Test equipment of the simulated station: the climate unit's legs, and a supply whose ripple and voltage do not stay."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -51,13 +51,37 @@ def test_a_shock_changes_the_air_within_minutes() -> None:
         assert air[round(180.0 / 10.0)] < -39.0
 
 
-@each([
+STOPPED = [
     ((), (25.0, 95.0, 30.0), OperatorNeeded, r"humidity at .* at the end of the leg, 95 ± 5 % was ordered"),
     ((), (200.0, None, 60.0), StationRefused, r"temperature 200\.0; -75\.0 to 180.0"),
     (("controller_abort",), (40.0, None, 60.0), OperatorNeeded, "door of the climate unit open"),
     (("missed_trigger",), (40.0, None, 60.0), RecordingSpoilt, "trigger was missed"),  # it is taken again
-])  # fmt: skip
+]
+
+
+@each(STOPPED)
 def test_what_stops_a_leg_is_told(row) -> None:
     faults, (celsius, humidity, seconds), error, told = row
     with opened(*(FaultOrder(kind=kind, at_s=0.0) for kind in faults)) as station, pytest.raises(error, match=told):
         station.equipment["climate"].expose(celsius, humidity, ROOM_HPA, 1.0, seconds, [0])
+
+
+def test_a_ripple_is_on_the_nominal_voltage_and_a_voltage_has_no_ripple() -> None:
+    with open_station(load_station(), lot_of(1, "SF1500"), roles=["power_supply"]) as station:
+        supply: Any = station.equipment["power_supply"]
+
+        def state() -> tuple[float, float]:
+            return supply.values.number("voltage"), supply.values.number("ripple")
+
+        supply.set_voltage(13.0)
+        supply.set_ripple(0.1, 100.0)
+        assert state() == (12.0, 0.1)
+        supply.set_ripple(0.2, 1000.0)
+        assert state() == (12.0, 0.2)
+        supply.set_voltage(11.0)
+        assert state() == (11.0, 0.0)
+        supply.set_ripple(0.1, 100.0)
+        supply.stand_by()
+        assert state() == (12.0, 0.0)
+        with pytest.raises(StationRefused, match="correct ripple_V of the recipe"):
+            supply.set_ripple(4.0, 100.0)

@@ -31,13 +31,11 @@ def station_of(role: str, profile: str, faults: list[FaultOrder] | None = None, 
 
 @contextmanager
 def opened(role: str, profile: str, **maximum: float) -> Iterator[Any]:
-    """The equipment of a role at a station that has nothing else."""
     with open_station(station_of(role, profile, **maximum), lot_of(1), roles=[role]) as station:
         yield station.equipment[role]
 
 
 def drives(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The amplitudes in V of all bursts of the simulated generator."""
     amplitudes: list[float] = []
     begin = Generator._begin
 

@@ -22,7 +22,6 @@ from stations.plant.table import Axis, Move, turn
 
 
 def mean_counts(plant, seconds=2, slot_id=11):
-    """Mean counts of the first slot over some seconds."""
     write(plant, 10, "rate", 100.0)
     write(plant, 10, "sampling", "running")
     plant.advance(seconds * 1_000_000)
@@ -151,9 +150,11 @@ NOTHING = {  # figures of an effect that is none; all others have a size
     "moisture_diffusion": ("swelling", "scale"), "leaky_lid": ("deflection", "scale"),
 }  # fmt: skip
 LARGE = {
-    "step_change": {"at": 500.0}, "vibration_rectification": {"coefficient": 1e7},
-    "yielding_adhesive": {"assembly": 40.0}, "creep": {"size": 5e-3, "tau": 60.0},
-}  # fmt: skip
+    "step_change": {"at": 500.0},
+    "vibration_rectification": {"coefficient": 1e7},
+    "yielding_adhesive": {"assembly": 40.0},
+    "creep": {"size": 5e-3, "tau": 60.0},
+}
 
 
 @pytest.mark.parametrize("kind", mostly_slow(AT_REST, *AT_REST[::4]))
