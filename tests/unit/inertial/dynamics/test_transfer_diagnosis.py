@@ -11,7 +11,7 @@ from scipy import signal
 from inertial.dynamics.spectra import transfer
 from inertial.dynamics.transfer_diagnosis import diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
-from inertial.dynamics.transfer_model import Points, factor_of, fit_transfer
+from inertial.dynamics.transfer_model import Points, _one_sided_steps, factor_of, fit_transfer
 
 
 def points(f: np.ndarray, h: np.ndarray, share: float, phase: float, rng: np.random.Generator | None = None) -> Points:
@@ -66,6 +66,13 @@ def test_several_models_at_once_are_the_models_each_alone(effect: str, rng: np.r
     values = np.array([[rng.choice(p.starts) for p in parameters] for _ in range(5)])
     at_once = factor_of(model, c)(values.T[..., None])
     np.testing.assert_array_equal(at_once, [factor_of(model, c)(row) for row in values])
+
+
+def test_slopes_at_a_bound_and_within_narrow_bounds_are_those_of_points_inside() -> None:
+    x, low, high = np.array([(0.0, -1.0, 1.0), (2.0, 0.0, 2.0), (-3.0, -3.0, 0.0), (1.0, 1.0 - 1e-9, 1.0)]).T
+    steps = _one_sided_steps(x, low, high)
+    assert np.all((x + steps >= low) & (x + steps <= high) & (steps != 0.0))
+    assert steps[0] > 0.0  # away from zero where both sides are free
 
 
 @pytest.mark.parametrize("kind", mostly_slow(["two_pole", "moving_average", "one_pole"], "one_pole"))

@@ -130,3 +130,12 @@ def test_a_ratio_keeps_no_model_with_its_columns(monkeypatch: pytest.MonkeyPatch
     again = ratio.at(2.0, Shares(walk=0.5))
     gc.collect()
     assert (len(made) > 2, again.score < ratio.score, [ref() for ref in made if ref()]) == (True, True, [])
+
+
+def test_pieces_of_a_candidate_hold_its_grid_once_under_keys_of_their_own() -> None:
+    columns = np.random.default_rng(4).standard_normal((3, 5, 7, 2))
+    whole = Candidate(columns, shared=False, rows=np.tile(np.arange(3), 4), key="effect")
+    pieces = list(whole.pieces(5))
+    assert np.array_equal(np.concatenate([piece.columns for piece in pieces], axis=2), columns)
+    assert (len(pieces), len({piece.key for piece in pieces})) == (4, 4)
+    assert (list(whole.pieces(14)), len(list(whole.pieces(1)))) == ([whole], 7)

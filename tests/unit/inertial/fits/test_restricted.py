@@ -75,3 +75,14 @@ def test_a_measurement_that_a_block_lacks_is_as_if_it_had_never_been(rng: np.ran
     other = (0.0, 3.0)
     apart = Series(h[:, :, kept], s[:, :, kept], z[..., kept], profile[kept], cut).solve(other).deviance
     assert gaps.solve(other).deviance - found.deviance == pytest.approx(apart - without.deviance, abs=1e-6)
+
+
+def test_blocks_without_gaps_are_untouched_by_those_with_gaps(rng: np.random.Generator) -> None:
+    own, missing = series(rng, blocks=2), np.zeros((2, 40), dtype=bool)
+    missing[1, [3, 30]] = True
+    beside = Series(own._h * own._scale, own._s, own._z, np.sqrt(np.diagonal(own.white)), own.kernels, missing)
+    one, other = own.solve((1.0, 2.0)), beside.solve((1.0, 2.0))
+    assert beside.dof.tolist() == [[36] * 3, [34] * 3]
+    for name in ("theta", "inverse", "squares"):
+        np.testing.assert_allclose(getattr(other, name)[0], getattr(one, name)[0], rtol=1e-9, err_msg=name)
+        assert not np.allclose(getattr(other, name)[1], getattr(one, name)[1], rtol=1e-9), name
