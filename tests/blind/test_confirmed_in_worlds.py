@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
+from each import each
 from long_suites import mostly_slow
 from made_worlds import BASE, Noise, World, force_of, make
 
@@ -16,30 +17,28 @@ from pipelines.diagnosis.diagnose import examination
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("effect", "parameter", "soaks"), [("thermal_hysteresis", "half_width", "nine"), ("thermal_lag", "tau", "ramps")]
-)
-def test_a_parameter_has_one_value_and_an_interval_that_holds_it(effect: str, parameter: str, soaks: str) -> None:
+@each([("thermal_hysteresis", "half_width", "nine"), ("thermal_lag", "tau", "ramps")])
+def test_a_parameter_has_one_value_and_an_interval_that_holds_it(row: tuple[str, str, str]) -> None:
+    effect, parameter, soaks = row
     run = make_run(Spec(effects=(effect,), sizes=(2.0,), plan="six", soaks=soaks, units=3), 3)
     document = examination(run.dwells, run.history, None).document
     (group,) = [g for g in document["classes"] if effect in g["effects"]]
     fitted = compare(run.dwells, [*document["effects"], group["nonlinear_of"]], run.history)
     told, own = group["nonlinear"][parameter], fitted["nonlinear"][group["nonlinear_of"]][parameter]
     assert told == pytest.approx(own, rel=0.01)
-    for low, high in (
-        group["nonlinear_interval"][parameter],
-        fitted["nonlinear_interval"][group["nonlinear_of"]][parameter],
-    ):
-        assert low <= own * 1.01
-        assert high >= own * 0.99
-        assert low < high
+    for intervals in (group["nonlinear_interval"], fitted["nonlinear_interval"][group["nonlinear_of"]]):
+        low, high = intervals[parameter]
+        assert (low <= own * 1.01, high >= own * 0.99, low < high) == (True, True, True)
 
 
 SEED = 5_500_000
+Spoil = Callable[[pd.DataFrame], None]
 
 
-def progress(world: World, effect: str, seed: int, *, fresh: bool = True) -> dict:
+def progress(world: World, effect: str, seed: int, spoil: Spoil | None = None, *, fresh: bool = True) -> dict:
     made = make(world, seed)
+    if spoil is not None:
+        spoil(made.dwells)
     again = (made.fresh, made.fresh_history) if fresh else (None, None)
     return compare(made.dwells, [*BASE, effect], made.history, *again, before=BASE)["progress"]
 
@@ -49,17 +48,17 @@ CONFIRMED = [  # units, g by which they come up elsewhere, hidden effect, seed, 
     (2, 300.0, "third_order", SEED, True),
     # 300 µg more or less hide what the effect takes off the error of the fresh run, unless the run has a bias of its own
     (1, 300.0, CURVE, 63_103, True),
-    *(pytest.param(n, 300.0, CURVE, seed, True, marks=pytest.mark.slow) for n, seed in ((1, 63_107), (8, 63_102))),
-    *(
-        pytest.param(4, turn_on, effect, SEED + 5, True, marks=pytest.mark.slow)
-        for effect, turn_on in (("cross_coupling", 300.0), ("second_order", 300.0), (CURVE, 0.0))
-    ),
     (4, 0.0, "third_order", SEED + 6, False),
-    pytest.param(4, 0.0, "cross_coupling", SEED + 6, False, marks=pytest.mark.slow),
+    (1, 300.0, CURVE, 63_107, True),
+    (8, 300.0, CURVE, 63_102, True),
+    (4, 300.0, "cross_coupling", SEED + 5, True),
+    (4, 300.0, "second_order", SEED + 5, True),
+    (4, 0.0, CURVE, SEED + 5, True),
+    (4, 0.0, "cross_coupling", SEED + 6, False),
 ]
 
 
-@pytest.mark.parametrize(("units", "turn_on", "effect", "seed", "fresh"), CONFIRMED)
+@pytest.mark.parametrize(("units", "turn_on", "effect", "seed", "fresh"), mostly_slow(CONFIRMED, *CONFIRMED[:3]))
 def test_effects_that_are_there_are_confirmed(units, turn_on, effect, seed, fresh):
     evidence = progress(World(units=units, turn_on=turn_on, hidden=((effect, 2.0),)), effect, seed, fresh=fresh)
     assert (evidence["confirmed"], evidence["reason"], evidence["rises"]) == (True, None, None)
@@ -67,12 +66,10 @@ def test_effects_that_are_there_are_confirmed(units, turn_on, effect, seed, fres
     assert not fresh or evidence["part"] == pytest.approx(1.0, abs=4.0 * evidence["part_u"])
 
 
-@pytest.mark.parametrize(
-    "effect",
-    mostly_slow(
-        ["bias_temperature_quadratic", "aging_log", "thermal_hysteresis", "step_change"], "aging_log", "step_change"
-    ),
-)
+SLOW = [CURVE, "aging_log", "thermal_hysteresis", "step_change"]
+
+
+@pytest.mark.parametrize("effect", mostly_slow(SLOW, "aging_log", "step_change"))
 def test_slow_effects_that_are_not_there_are_not_confirmed(effect):
     world = World(units=2, noise=Noise(walk=4.0))
     assert progress(world, effect, SEED)["confirmed"] is not True
@@ -83,10 +80,7 @@ def slipped(dwells: pd.DataFrame) -> None:
     """The table slips on its drive half-way: further out by 0.35 mrad from there on."""
     late = dwells["dwell"] >= dwells["dwell"].max() / 2
     outer, inner = (np.radians(dwells.loc[late, f"{axis}_deg"].to_numpy()) for axis in ("outer", "inner"))
-    for name, change in zip(
-        "xyz", np.moveaxis(force_of(outer + 0.35e-3, inner) - force_of(outer, inner), -1, 0), strict=True
-    ):
-        dwells.loc[late, f"out_{name}"] += change
+    dwells.loc[late, ["out_x", "out_y", "out_z"]] += force_of(outer + 0.35e-3, inner) - force_of(outer, inner)
 
 
 def exchanged(dwells: pd.DataFrame) -> None:
@@ -111,28 +105,19 @@ def warming(dwells: pd.DataFrame) -> None:
         dwells[f"out_{name}"] *= 1.0 + size[place, k] * np.exp(-since / 2400.0)
 
 
-def spoilt(units: int, spoil: Callable[[pd.DataFrame], None], effect: str, *, fresh: bool) -> dict:
-    made = make(World(units=units), SEED + 7)
-    spoil(made.dwells)
-    again = (made.fresh, made.fresh_history) if fresh else (None, None)
-    return compare(made.dwells, [*BASE, effect], made.history, *again, before=BASE)["progress"]
+IMITATED = [
+    (1, slipped, "outer_encoder_offset", "no clear fall"),
+    (1, slipped, "cross_coupling", "no clear fall"),
+    (4, exchanged, "misalignment_temperature", "left out"),
+    (4, exchanged, "scale_temperature_quadratic", "fault|names"),
+    (4, misread, "scale_temperature_quadratic", "names soak_thermometer"),
+    (4, warming, "scale_temperature_quadratic", "names|not adequate"),
+]
 
 
-@pytest.mark.parametrize(
-    ("units", "spoil", "effect", "reason"),
-    [
-        (1, slipped, "outer_encoder_offset", "no clear fall"),
-        (1, slipped, "cross_coupling", "no clear fall"),
-        (4, exchanged, "misalignment_temperature", "left out"),
-        (4, exchanged, "scale_temperature_quadratic", "fault|names"),
-        *(
-            pytest.param(4, spoil, "scale_temperature_quadratic", reason, marks=pytest.mark.slow)
-            for spoil, reason in ((misread, "names soak_thermometer"), (warming, "names|not adequate"))
-        ),
-    ],
-)
+@pytest.mark.parametrize(("units", "spoil", "effect", "reason"), mostly_slow(IMITATED, *IMITATED[:4]))
 def test_dwells_left_out_of_one_run_do_not_confirm_what_imitates_its_fault(units, spoil, effect, reason):
-    evidence = spoilt(units, spoil, effect, fresh=False)
+    evidence = progress(World(units=units), effect, SEED + 7, spoil, fresh=False)
     assert evidence["log_density"] > 4.0  # it predicts what is left out
     assert evidence["confirmed"] is None
     assert re.search(reason, evidence["reason"]), evidence["reason"]
@@ -142,4 +127,4 @@ def test_dwells_left_out_of_one_run_do_not_confirm_what_imitates_its_fault(units
 
 
 def test_what_imitates_a_slip_is_not_confirmed_by_a_fresh_run():
-    assert spoilt(1, slipped, "cross_coupling", fresh=True)["confirmed"] is False
+    assert progress(World(units=1), "cross_coupling", SEED + 7, slipped)["confirmed"] is False

@@ -1,14 +1,10 @@
 """The generator does what it claims, judged with plain least squares written here."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from each import each
-from scipy.signal import welch
 
-from benchmarks.truth import Spec, case, make_run
-from benchmarks.truth.memory import lag, play, preisach
-from benchmarks.truth.noise import flicker_series
+from benchmarks.truth import Spec, make_run
 from benchmarks.truth.scenarios import FAULT_NAMES
 
 OUTPUTS = ["out_x", "out_y", "out_z"]
@@ -62,41 +58,14 @@ def test_null_run_has_the_noise_it_claims(row):
     assert rms(left) > (0.96 if flicker + walk == 0.0 else 0.8) * run.sealed.floor_ug
 
 
-def test_same_seed_gives_the_same_run_and_another_seed_another():
-    spec = Spec(effects=("third_order",), sizes=(1.0,), flicker=1.0)
-    first, again, other = (make_run(spec, seed) for seed in (3, 3, 4))
-    pd.testing.assert_frame_equal(first.dwells, again.dwells)
-    pd.testing.assert_frame_equal(first.history, again.history)
-    assert not np.allclose(first.dwells["out_x"], other.dwells["out_x"])
-
-
 def test_fresh_run_has_the_same_effects_and_units_under_new_noise():
     plain = {"flicker": 1.0, "plan": "fibonacci24", "soaks": "nine"}
     run = make_run(Spec(effects=("cross_coupling",), sizes=(6.0,), **plain), 12)
     assert list(run.dwells["unit"]) == list(run.fresh["unit"])
     null = make_run(Spec(**plain), 12)
-    alike = []
-    for one in (run, null):
+    for one, least, most in ((run, 0.9, 1.0), (null, -0.1, 0.1)):
         pair = [residuals(t, t[OUTPUTS].to_numpy(), thermal=True).ravel() for t in (one.dwells, one.fresh)]
-        alike.append(np.corrcoef(pair)[0, 1])
-    assert alike[0] > 0.9
-    assert abs(alike[1]) < 0.1
-
-
-@pytest.mark.slow
-def test_invisible_effects_leave_no_trace_under_their_plan():
-    for index in range(6):
-        run = case("invisible", index, 2)
-        (effect,) = run.sealed.effects
-        assert not effect.visible
-        assert effect.size < 0.05
-
-
-def test_station_effect_is_the_same_in_every_unit():
-    plain = {"units": 4, "device": "mems"}
-    run, without = make_run(Spec(effects=("level_error",), sizes=(4.0,), **plain), 6), make_run(Spec(**plain), 6)
-    added = (run.dwells[OUTPUTS] - without.dwells[OUTPUTS]).to_numpy().reshape(4, -1)
-    assert np.abs(added - added.mean(axis=0)).max() < 0.02 * np.abs(added).max()
+        assert least < np.corrcoef(pair)[0, 1] < most
 
 
 @pytest.mark.slow
@@ -117,26 +86,3 @@ def test_fault_changes_its_own_unit_only_and_leaves_the_fresh_run_clean(fault):
     if fault == "swapped_dwells":
         gap = (run.dwells[OUTPUTS] - clean.dwells[OUTPUTS]).abs().sum(axis=1)
         assert np.count_nonzero(gap) == 2
-
-
-# -- operators with memory, geometry and noise ---------------------------------------------------------------------------
-
-
-def test_lag_play_and_relays_remember_as_their_physics_says():
-    ramp = np.arange(4000.0) * 5.0
-    assert (ramp - lag(ramp, 120.0, 5.0))[-1] == pytest.approx(120.0, rel=0.03)
-    way = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.3, 50)])
-    assert play(way, 0.1)[[49, -1]] == pytest.approx([0.9, 0.4])
-    up = np.linspace(-1.0, 1.0, 200)
-    out = preisach(np.concatenate([up, up[::-1], up])[None], -0.95, 0.95)[0]
-    assert out[200] == pytest.approx(out[-1])  # the loop closes
-    assert out[300] - out[500] > 0.2  # and has an area
-
-
-@each([True, False])
-def test_flicker_has_a_spectrum_that_falls_as_one_over_f(fractional):
-    series = flicker_series(np.random.default_rng(1), 64, 4096, fractional=fractional)
-    frequency, power = welch(series, nperseg=2048)
-    band = (frequency > 0.004) & (frequency < 0.1)
-    slope = np.polyfit(np.log(frequency[band]), np.log(power.mean(axis=0)[band]), 1)[0]
-    assert slope == pytest.approx(-1.0, abs=0.1)

@@ -19,7 +19,6 @@ def no_proposals(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def told_in(group: dict, names: tuple[str, ...], units: tuple[str, ...], dwells: tuple[int, ...], how: str) -> bool:
-    """Whether a class tells a fault, as exactly as the row asks."""
     if how == "names":
         return bool(set(names) & set(group["effects"]))
     if not set(names) & set(group["effects"]) or tuple(group["units"]) != units:

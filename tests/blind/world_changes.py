@@ -11,7 +11,6 @@ from inertial.frames import force_from_angles
 
 
 def raised(dwells: pd.DataFrame, unit: int, axis: str, size: float, dwells_from: int = 0, until: int = 999) -> None:
-    """The output of one axis of a unit is ``size`` g higher in a range of dwells."""
     name = dwells["unit"].unique()[unit]
     chosen = (dwells["unit"] == name) & (dwells["dwell"] >= dwells_from) & (dwells["dwell"] < until)
     dwells.loc[chosen, f"out_{axis}"] += size
@@ -29,7 +28,6 @@ def in_middle_soak(*axes: tuple[int, str, float]) -> Callable[[pd.DataFrame], pd
 
 
 def stated_forces(dwells: pd.DataFrame) -> pd.DataFrame:
-    """The forces of the poses in place of the angles of the table."""
     outer, inner = (np.radians(dwells[name].to_numpy()) for name in ("outer_deg", "inner_deg"))
     names = ["force_x", "force_y", "force_z"]
     dwells[names] = force_from_angles(outer, inner)
@@ -37,7 +35,6 @@ def stated_forces(dwells: pd.DataFrame) -> pd.DataFrame:
 
 
 def exchanged_for_a_soak(dwells: pd.DataFrame) -> pd.DataFrame:
-    """The first two units are in each other's seats in the second of three soaks, and go back."""
     middle = (dwells["dwell"] >= 24) & (dwells["dwell"] < 48)
     one, other = (np.flatnonzero(middle & (dwells["unit"] == name)) for name in dwells["unit"].unique()[:2])
     felt = [dwells.columns.get_loc(name) for name in dwells if name.startswith(("out_", "sd_", "unit_C"))]
@@ -49,7 +46,6 @@ def exchanged_for_a_soak(dwells: pd.DataFrame) -> pd.DataFrame:
 
 
 def exchange_is_told(document: dict, lot: MadeLot) -> bool:
-    """The pair, as an error of handling or as a fault of both units."""
     pair = set(lot.dwells["unit"].unique()[:2])
     told = [one for one in document["classes"] if "units_swapped" in one["effects"]]
     blocked = {unit for one in document["blocked_by"] if one["fault"] == "units_swapped" for unit in one["units"]}
@@ -89,7 +85,6 @@ def same_pose(dwells: pd.DataFrame) -> np.ndarray:
 
 
 def two_dwells_of_a_pose(dwells: pd.DataFrame) -> pd.DataFrame:
-    """They are off in different directions."""
     for axis, row in zip(("out_x", "out_y"), same_pose(dwells), strict=True):
         dwells.loc[row, axis] += 1e-3
     return dwells
@@ -135,7 +130,6 @@ def jumping_and_turned(dwells: pd.DataFrame) -> pd.DataFrame:
 
 
 def last_unit_amplifies(dwells: pd.DataFrame) -> pd.DataFrame:
-    """The last unit reads 500 ppm more from the dwell half-way on."""
     later = (dwells["unit"] == dwells["unit"].max()) & (dwells["dwell"] >= 36)
     dwells.loc[later, ["out_x", "out_y", "out_z"]] *= 1.0 + 500e-6
     return dwells
@@ -149,7 +143,6 @@ def gain_step_is_certain(document: dict, made: MadeLot) -> bool:
 
 
 def step_before(dwell: int) -> Check:
-    """The step lies in the gap before a dwell, and nothing else stands beside it."""
 
     def step_in_its_gap(document: dict, made: MadeLot) -> bool:
         (group,) = document["classes"]
@@ -233,7 +226,6 @@ def jump_has_place_and_size(document: dict, made: MadeLot) -> bool:
 
 
 def unsteady(*units: str) -> Check:
-    """The units whose bias is unsteady are told, each with its sizes from a line over temperature."""
 
     def check(document: dict, _: MadeLot) -> bool:
         groups = document["classes"]
@@ -319,7 +311,6 @@ def may_be_of_the_station(document: dict, _: MadeLot) -> bool:
 
 
 def right_of(effect: str) -> Check:
-    """The one class has a name that is right for an effect of a unit turned by hand, which is recommended."""
 
     def right_effect_is_named(document: dict, _: MadeLot) -> bool:
         right = EFFECTS[effect][3]

@@ -55,7 +55,6 @@ class MadeLot:
 
 
 def made(world: AnyWorld, seed: int) -> MadeLot:
-    """The lot of a world."""
     if isinstance(world, World):
         lot = make(world, seed)
         return MadeLot(lot.dwells, lot.history, lot.faults, lot.floor_ug)

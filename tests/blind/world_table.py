@@ -5,6 +5,7 @@ The generators share nothing with the estimator. Rows with ``fast`` are part of 
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import world_changes as changes
@@ -21,6 +22,7 @@ OWN_NOISE, LARGE, SLIPS = 5_900_000, 6_200_000, 6_100_000
 SWAPS, POSES, JUMPS = 6_300_000, 6_400_000, 6_500_000
 CLOCKS = frozenset({"time_s", "since_power_s"})
 HEAT = CLOCKS | {"unit_C", "chamber_C"}
+physical, handled = partial(Row, physics=True), partial(Row, recommended=())
 LOUD_SLIP = World(units=1, noise=Noise(white=25.0, flicker=30.0), fault="table_slip", amount=0.35)
 
 
@@ -28,14 +30,8 @@ def rows() -> Iterator[Row]:
     """Every row: first without anything hidden, then faults, then physics."""
     walk = World(units=2, poses=12, hidden=(("third_order", 0.2),), noise=Noise(walk=4.0))
     yield Row(NULLS["K8"], SEED, "K8", first=(), adequate=(True,), also=changes.walk_is_known, fast=True)
-    yield Row(
-        walk,
-        41_000_007,
-        "cubic under a walk",
-        named=("third_order",),
-        physics=True,
-        adequate=(False,),
-        also=changes.small_and_seen,
+    yield physical(
+        walk, 41_000_007, "cubic under a walk", named=("third_order",), adequate=(False,), also=changes.small_and_seen
     )
     for name in sorted(set(NULLS) - {"lsb5", "many_units"}):
         for seed in (SEED + 1, SEED + 2):
@@ -62,9 +58,9 @@ def rows() -> Iterator[Row]:
 
 
 def rows_of_dwells_and_poses() -> Iterator[Row]:
-    yield Row(
-        FAULTS["dwell_0.5mg"], SEED, "dwell_0.5mg", first=("bad_dwell",), alone=True, told="dwells",
-        recommended=(), adequate=(False,), also=changes.carried_by_the_dwell, fast=True,
+    yield handled(
+        FAULTS["dwell_0.5mg"], SEED, "dwell_0.5mg", first=("bad_dwell",), alone=True, told="dwells", adequate=(False,),
+        also=changes.carried_by_the_dwell, fast=True,
     )  # fmt: skip
     for units in (1, 2):
         for amount in (0.5, 2.0, 5.0):
@@ -83,22 +79,21 @@ def rows_of_dwells_and_poses() -> Iterator[Row]:
     for degrees in (0.1, 2.0, 20.0):
         world = World(fault="wrong_pose", amount=degrees)
         yield Row(world, POSES + 70, f"pose off {degrees:g}°", first=("wrong_pose",), told="dwells")
-    # the same where the forces are stated, and no angles of a table
     for name, first in (("pose_2deg", "wrong_pose"), ("pose_off_one_unit", "pose_off")):
-        yield Row(
-            FAULTS[name], POSES + 1, f"{name} of stated forces", first=(first,), told="dwells", recommended=(),
-            change=changes.stated_forces, fast=True,
+        yield handled(
+            FAULTS[name], POSES + 1, f"{name} of stated forces", first=(first,), told="dwells", change=changes.stated_forces,
+            fast=True,
         )  # fmt: skip
     for seed in (SEED + 5, SEED + 6, SEED + 7):
-        yield Row(
-            World(units=3), seed, "two units exchanged for a soak", recommended=(),
-            change=changes.exchanged_for_a_soak, also=changes.exchange_is_told, fast=seed == SEED + 5,
+        yield handled(
+            World(units=3), seed, "two units exchanged for a soak", change=changes.exchanged_for_a_soak,
+            also=changes.exchange_is_told, fast=seed == SEED + 5,
         )  # fmt: skip
     for name in ("pose_off_one_unit", "pose_off_one_unit_12", "pose_off_two_units"):
         for seed in (1, 2, 3):
-            yield Row(
-                FAULTS[name], POSES + seed, name, first=("pose_off",), told="dwells", recommended=(),
-                unexplained=frozenset(), fast=(name, seed) == ("pose_off_one_unit", 1),
+            yield handled(
+                FAULTS[name], POSES + seed, name, first=("pose_off",), told="dwells", unexplained=frozenset(),
+                fast=(name, seed) == ("pose_off_one_unit", 1),
             )  # fmt: skip
 
 
@@ -106,24 +101,24 @@ def rows_of_handling() -> Iterator[Row]:
     for name in sorted(set(FAULTS) - {"moved_one_unit"}):
         for seed in (SEED + 3, SEED + 4):
             yield Row(FAULTS[name], seed, name, told="names")
-    yield Row(
-        FAULTS["moved_0.2mrad"], SEED, "moved_0.2mrad", told="near", recommended=(), physics=True,
+    yield physical(
+        FAULTS["moved_0.2mrad"], SEED, "moved_0.2mrad", told="near", recommended=(),
         also=lambda document, _: "mrad about" in document["classes"][0]["evidence"], fast=True,
     )  # fmt: skip
-    yield Row(
-        FAULTS["thermometer_0.5K"], SEED, "thermometer_0.5K", named=("soak_thermometer",), physics=True,
-        recommended=(), also=changes.three_soaks_are_said,
+    yield physical(
+        FAULTS["thermometer_0.5K"], SEED, "thermometer_0.5K", named=("soak_thermometer",), recommended=(),
+        also=changes.three_soaks_are_said,
     )  # fmt: skip
-    yield Row(
-        replace(FAULTS["unsoaked"], units=3), SEED, "unsoaked", named=("device_not_soaked",), recommended=(),
+    yield handled(
+        replace(FAULTS["unsoaked"], units=3), SEED, "unsoaked", named=("device_not_soaked",),
         also=changes.time_constant_is_right,
     )  # fmt: skip
     yield Row(
         replace(FAULTS["unit_unsoaked"], units=3), SEED, "unit_unsoaked", first=("unit_not_soaked",), told="units"
     )
     yield Row(
-        replace(FAULTS["dwell_of_moved"], units=4), SEED, "dwell_of_moved", first=("unit_moved", "bad_dwell"),
-        told="units", also=changes.both_faults_stand,
+        replace(FAULTS["dwell_of_moved"], units=4), SEED, "dwell_of_moved", first=("unit_moved", "bad_dwell"), told="units",
+        also=changes.both_faults_stand,
     )  # fmt: skip
     for fault, amount, seed, name in (
         ("unit_moved", 0.3, 1, "unit_moved"), ("unit_moved", 0.3, 3, "unit_moved"),
@@ -131,27 +126,21 @@ def rows_of_handling() -> Iterator[Row]:
         ("wrong_pose", 0.1, 6, "wrong_pose"),
     ):  # fmt: skip
         world = World(units=40, poses=12, fault=fault, amount=amount)
-        yield Row(world, LARGE + seed, f"{name} of 40", first=(name,), alone=True, told="dwells", recommended=())
+        yield handled(world, LARGE + seed, f"{name} of 40", first=(name,), alone=True, told="dwells")
     for soaks, poses in (((-10.0, 25.0, 60.0), 24), ((-10.0, 25.0, 60.0), 12), ((22.0,), 24)):
         for seed in (2, 3):
             world = replace(LOUD_SLIP, soaks=soaks, poses=poses)
-            yield Row(
-                world,
-                SLIPS + seed,
-                f"slip of one {poses}, {len(soaks)}",
-                first=("table_slip",),
-                told="dwells",
-                recommended=(),
+            yield handled(
+                world, SLIPS + seed, f"slip of one {poses}, {len(soaks)}", first=("table_slip",), told="dwells"
             )
     for seed in (2, 3):
         world = replace(LOUD_SLIP, fault="unit_moved", amount=0.5)
-        yield Row(world, SLIPS + seed, "one unit moved", first=("unit_moved",), told="dwells", physics=True)
-        yield Row(
+        yield physical(world, SLIPS + seed, "one unit moved", first=("unit_moved",), told="dwells")
+        yield physical(
             FAULTS["slip_and_moved"], POSES + 18 + seed, "slip_and_moved", first=("table_slip", "unit_moved"), told="units",
-            physics=True,
         )  # fmt: skip
         world = World(fault="unit_moved", amount=0.5, beside=(("unit_moved", 0.5),))
-        yield Row(world, POSES + 28 + seed, "two moved", told="units", unexplained=frozenset(), physics=True)
+        yield physical(world, POSES + 28 + seed, "two moved", told="units", unexplained=frozenset())
     yield from rows_of_exchanges()
 
 
@@ -159,20 +148,18 @@ def rows_of_exchanges() -> Iterator[Row]:
     names = ("swapped", "swapped_thermometers", "swapped_alike", "swapped_two_units")
     seeds = [(name, seed) for name in names for seed in (1, 2)]
     for name, seed in (*seeds, ("swapped", 3), ("swapped_two_units", 700_002), ("swapped_many_units", 1)):
-        yield Row(
-            FAULTS[name], SWAPS + seed, name, first=("units_swapped",), alone=True, told="units", recommended=(),
-            unexplained=frozenset(), also=changes.from_one_dwell, fast=(name, seed) == ("swapped_two_units", 1),
+        yield handled(
+            FAULTS[name], SWAPS + seed, name, first=("units_swapped",), alone=True, told="units", unexplained=frozenset(),
+            also=changes.from_one_dwell, fast=(name, seed) == ("swapped_two_units", 1),
         )  # fmt: skip
-    yield Row(FAULTS["swapped"], SWAPS + 5, "swapped back", physics=True, also=changes.noise_of_the_lot)
+    yield physical(FAULTS["swapped"], SWAPS + 5, "swapped back", also=changes.noise_of_the_lot)
     world = World(differ=0.4, fault="units_swapped")
-    yield Row(
-        world, SWAPS + 112, "swapped apart", first=("units_swapped",), alone=True, told="units", physics=True,
+    yield physical(
+        world, SWAPS + 112, "swapped apart", first=("units_swapped",), alone=True, told="units",
         also=lambda document, _: document["blocked_by"] == [],
     )  # fmt: skip
     world = World(units=4, differ=0.2)
-    yield Row(
-        world, SWAPS + 30, "half exchanged", physics=True, also=changes.not_exchanged, change=changes.half_exchanged
-    )
+    yield physical(world, SWAPS + 30, "half exchanged", also=changes.not_exchanged, change=changes.half_exchanged)
 
 
 def rows_of_single_axes() -> Iterator[Row]:
@@ -184,9 +171,9 @@ def rows_of_single_axes() -> Iterator[Row]:
     middle = changes.in_middle_soak((3, "x", 600e-6))
     yield Row(World(units=6), OWN_NOISE + 90, "another bias in one soak", also=changes.some_unsteady, change=middle)
     for rate in (1800.0, 4000.0):
-        yield Row(
+        yield physical(
             World(units=6, noise=Noise(flicker=10.0)), OWN_NOISE + 95, f"scale drifts, {rate:g} s", adequate=(False,),
-            physics=True, unexplained=CLOCKS, also=changes.no_reference_step, change=changes.drifting_scale(rate),
+            unexplained=CLOCKS, also=changes.no_reference_step, change=changes.drifting_scale(rate),
         )  # fmt: skip
     for axes in ((((1, "y"), (5, "y"))), ((0, "x"), (3, "z"), (6, "y"))):
         yield Row(
@@ -205,9 +192,8 @@ def rows_of_single_axes() -> Iterator[Row]:
         )
         # of one unit, in three soaks, a step and a slope are the same columns; the step is named alone
         missed = "" if label == "y of all" else "a step of the unit is named, and not that a curve explains it as well"
-        yield Row(
-            World(), JUMPS + 3, f"curve, {label}", named=("bias_temperature_quadratic",), physics=True, change=change,
-            not_reached=missed,
+        yield physical(
+            World(), JUMPS + 3, f"curve, {label}", named=("bias_temperature_quadratic",), change=change, not_reached=missed,
         )  # fmt: skip
 
 
@@ -216,113 +202,90 @@ def rows_of_steps() -> Iterator[Row]:
     noise = Noise(white=25.0, flicker=30.0)
     world = World(units=4, poses=48, noise=noise)
     for dwell in (72, 79):
-        yield Row(
-            world, OWN_NOISE + 2, f"step before {dwell}", first=("step_change",), physics=True, also=changes.step_before(dwell),
+        yield physical(
+            world, OWN_NOISE + 2, f"step before {dwell}", first=("step_change",), also=changes.step_before(dwell),
             change=changes.jumping(dwell, 2),
         )  # fmt: skip
-    yield Row(
-        world, OWN_NOISE + 2, "pose missed after a step", named=("step_change",), physics=True,
-        also=changes.pose_missed_at_the_step, change=changes.jumping_and_turned,
+    yield physical(
+        world, OWN_NOISE + 2, "pose missed after a step", named=("step_change",), also=changes.pose_missed_at_the_step,
+        change=changes.jumping_and_turned,
     )  # fmt: skip
     for dwell, seed in ((37, 4), (37, 5), (44, 3), (44, 4), (44, 5)):
         # without the dwells before it every instant between their neighbours is as good: it had stood there and kept them bad
-        yield Row(
+        yield physical(
             World(units=1, noise=noise), OWN_NOISE + seed, f"step of one unit before {dwell}", first=("step_change",),
-            physics=True, also=changes.no_dwell_is_removed, change=changes.jumping(dwell, seed, 600.0),
+            also=changes.no_dwell_is_removed, change=changes.jumping(dwell, seed, 600.0),
         )  # fmt: skip
     for units in (1, 2):
         for seed in (3, 4, 7):
-            yield Row(
+            yield physical(
                 World(units=units, noise=noise), 5_700_000 + seed, f"gain step of one of {units}", named=("gain_step",),
-                physics=True, also=changes.gain_step_is_certain, change=changes.last_unit_amplifies,
+                also=changes.gain_step_is_certain, change=changes.last_unit_amplifies,
             )  # fmt: skip
 
 
 def rows_of_what_is_left_over() -> Iterator[Row]:
-    # an error of handling that was found first, and explains nothing beside what was found after it
     for index, driver, missed in ((26, "supply_V", "a wrong pose is told beside the supply"), (14, "vibration_g", "")):
         yield Row(
-            Case("withheld", index), 9931, f"poses and {driver}", first=(), unexplained=frozenset({driver}), not_reached=missed
+            Case("withheld", index), 9931, f"poses and {driver}", first=(), unexplained=frozenset({driver}),
+            not_reached=missed,
         )  # fmt: skip
-    # the state of a memory before the run had looked like a first pose that was wrong
     for index, effect in ((199, "pose_hysteresis"), (32, "creep_after_move")):
-        yield Row(
-            Case("lot8_size1", index), 77_002, f"{effect} from before the run", first=(effect,), physics=True,
-            recommended=(effect,), unexplained=frozenset(),
+        yield physical(
+            Case("lot8_size1", index), 77_002, f"{effect} from before the run", first=(effect,), recommended=(effect,),
+            unexplained=frozenset(),
         )  # fmt: skip
     # of eight dwells a curve takes so much of the freedom that the deviance falls: six of ten such lots were not adequate by it
     few = World(units=3, poses=8, soaks=(25.0,), noise=Noise(flicker=300.0))
     for seed in (3, 6, 7, 16):
         yield Row(few, seed, "eight dwells", first=(), adequate=(True,), unexplained=frozenset(), fast=seed == 6)
-    # every unit clicks at times of its own: a course over time, of which six jumps would be told and the others not
     yield Row(Strange("clicks"), 282_526_000, "clicks", first=(), adequate=(False,), unexplained=frozenset({"time_s"}))
-    # Preisach's hysteresis, of which the play leaves something over: a curve in time had followed both
-    yield Row(
-        Case("lot8_size2", 2), 77_001, "hysteresis in shuffled soaks", named=("thermal_hysteresis",), physics=True,
+    yield physical(
+        Case("lot8_size2", 2), 77_001, "hysteresis in shuffled soaks", named=("thermal_hysteresis",),
         unexplained=frozenset(),
     )  # fmt: skip
 
 
 def rows_of_physics() -> Iterator[Row]:
     world = World(units=4, poses=6, soaks=(25.0, 60.0, -10.0, 20.0), hidden=(("thermal_hysteresis", 4.0),))
-    yield Row(world, SEED, "hysteresis", physics=True, also=changes.step_with_hysteresis)
+    yield physical(world, SEED, "hysteresis", also=changes.step_with_hysteresis)
     for scene in ("creep on faces", "creep on faces, shuffled"):
         # the table turned before the first dwell: the state of the creep there is unknown, and looks like a warm-up of
         # seconds; its way from face to face leads through other directions, which looks like a product of two forces
-        yield Row(
-            SCENES[scene], SEED, scene, first=("creep_after_move",), alone=True, physics=True, unexplained=frozenset()
-        )
-    yield Row(
-        HIDDEN["adc_nonlinearity_5"], SEED, "adc_nonlinearity_5", first=("adc_nonlinearity",), alone=True, physics=True
-    )
+        yield physical(SCENES[scene], SEED, scene, first=("creep_after_move",), alone=True, unexplained=frozenset())
+    yield physical(HIDDEN["adc_nonlinearity_5"], SEED, "adc_nonlinearity_5", first=("adc_nonlinearity",), alone=True)
     world = World(units=4, hidden=(("third_order", 2.0),))
-    yield Row(
-        world, SEED, "cubic", physics=True, recommended=("third_order",), also=changes.verdict_is_carried, fast=True
-    )
-    # a humidity that wanders slowly, with an effect that saturates: a curve of time follows it nearly as well
+    yield physical(world, SEED, "cubic", recommended=("third_order",), also=changes.verdict_is_carried, fast=True)
     for index in (0, 2):
-        yield Row(
-            Case("covariate_curve", index), 8080, "humidity", physics=True, unexplained=frozenset({"humidity_pct"})
-        )
-    # groups of neighbouring temperatures are of unequal size on a ramp
+        yield physical(Case("covariate_curve", index), 8080, "humidity", unexplained=frozenset({"humidity_pct"}))
     for name in ("ramps_B300", "ramps_K4"):
         yield Row(RAMP_NULLS[name], SEED, name, first=(), adequate=(True,))
     for name in ("thermal_lag", "thermal_hysteresis", "third_order"):
-        yield Row(RAMP_HIDDEN[f"ramps_{name}"], SEED, f"ramps_{name}", named=(name,), physics=True)
-    # each unit and axis is pushed by its own amount: the mean of the lot looks like two wrong angles
+        yield physical(RAMP_HIDDEN[f"ramps_{name}"], SEED, f"ramps_{name}", named=(name,))
     yield Row(Case("withheld", 4), 8080, "brownout", first=(), unexplained=frozenset({"supply_V"}))
-    # too small to be searched for, and the only reason why the model is not adequate
     nine = World(units=8, soaks=(-30.0, -15.0, 0.0, 10.0, 25.0, 35.0, 45.0, 55.0, 65.0), noise=Noise(flicker=0.0))
     small = replace(nine, hidden=(("third_order", 0.16),))
-    yield Row(
-        small, 53, "small cubic", named=("third_order",), adequate=(False,), physics=True,
-        recommended=("third_order",), unexplained=frozenset(),
+    yield physical(
+        small, 53, "small cubic", named=("third_order",), adequate=(False,), recommended=("third_order",),
+        unexplained=frozenset(),
     )  # fmt: skip
     yield Row(nine, 54, "nothing of many dwells", first=(), adequate=(True,), unexplained=frozenset())
-    # a day's course that all units share, and what each move leaves: no random walk and no louder noise, as they were taken for
     for index, seed, driver in ((5, 771, "time_s"), (12, 771, "time_s"), (11, 771, "since_move_s")):
         yield Row(
             Case("withheld", index), seed, f"{driver} in the noise", first=(), adequate=(False,),
             unexplained=frozenset({driver}),
         )  # fmt: skip
-    # a fault is no less told for an effect outside the catalogue; the second had ended with an IndexError
     for fault, seed in (("unit_moved", 930_004), ("wrong_pose", 930_008)):
         world = World(hidden=(("scale_warms_up", 2.0),), fault=fault, amount=0.5)
-        yield Row(world, seed, f"{fault} and unknown", told="names", physics=True, adequate=(False,))
+        yield physical(world, seed, f"{fault} and unknown", told="names", adequate=(False,))
     for name in ("misalignment_and_moved", "misalignment_and_slip"):
-        yield Row(
-            HIDDEN[name], SEED, name, named=("misalignment_temperature",), told="names", physics=True,
+        yield physical(
+            HIDDEN[name], SEED, name, named=("misalignment_temperature",), told="names",
             recommended=("misalignment_temperature",), also=changes.left_out_dwells_judge,
         )  # fmt: skip
     world = World(units=3, hidden=(("cross_coupling", 2.0),))
-    yield Row(
-        world,
-        SEED,
-        "late and with gaps",
-        first=("cross_coupling",),
-        alone=True,
-        physics=True,
-        change=changes.late_and_with_gaps,
+    yield physical(
+        world, SEED, "late and with gaps", first=("cross_coupling",), alone=True, change=changes.late_and_with_gaps
     )
     for name in OUTSIDE:
         yield Row(
@@ -330,53 +293,50 @@ def rows_of_physics() -> Iterator[Row]:
             also=changes.noise_beside_the_dependence,
         )  # fmt: skip
     for name in ("fixture_bends", "axes_bend_with_heat", "cubic_with_heat"):
-        # axes and transfer curves that follow the temperature show in no bias; an excess of them had counted as noise
-        yield Row(World(hidden=((name, 8.0),)), POSES + 2, f"large {name}", adequate=(False,), physics=True)
+        yield physical(World(hidden=((name, 8.0),)), POSES + 2, f"large {name}", adequate=(False,))
 
 
 def rows_of_other_generators() -> Iterator[Row]:
     """Sensor, station or handling, and what is recommended, in lots whose makers know nothing of the judge."""
     pivot = Case("lot8_size1", 40)
-    yield Row(pivot, 5150, "pivot that sticks", physics=True, also=changes.pivot_is_in_the_class)
+    yield physical(pivot, 5150, "pivot that sticks", also=changes.pivot_is_in_the_class)
     for index, effect in ((39, "backlash"), (35, "pose_hysteresis")):
-        yield Row(
-            Case("lot8_size2", index), 5150, effect, first=(effect,), alone=True, physics=True, recommended=(effect,),
+        yield physical(
+            Case("lot8_size2", index), 5150, effect, first=(effect,), alone=True, recommended=(effect,),
             also=changes.memory_is_judged_on_dwells_left_out,
         )  # fmt: skip
     for seed in (95_001, 5_950_001):
         also = changes.told_with_its_bias_and_without_physics
-        yield Row(Strange("unit_seated_again", 20.0), seed, "seated again", physics=True, also=also)
+        yield physical(Strange("unit_seated_again", 20.0), seed, "seated again", also=also)
     for seed in (420_004, 420_006):
         also = changes.linear_coefficients_are_named
-        yield Row(Strange("null"), seed, "one temperature that wanders", physics=True, also=also)
+        yield physical(Strange("null"), seed, "one temperature that wanders", also=also)
     for seed in (98_000_003, 98_000_007):
         grows = Strange("grows_with_force")
         yield Row(grows, seed, "noise along gravity", first=(), unexplained=frozenset(), fast=seed == 98_000_003)
     # what the table passes on its way drags friction along; the legs of its base are an hour behind the chamber
     for seed in (99_100_001, 99_100_007):
-        yield Row(Strange("friction_in_bearing"), seed, "friction on the way", first=("pose_hysteresis",), physics=True)
+        yield physical(Strange("friction_in_bearing"), seed, "friction on the way", first=("pose_hysteresis",))
     for seed in (99_100_007, 99_100_009):
-        yield Row(Strange("base_tilts"), seed, "late base", first=("base_tilts",), physics=True)
+        yield physical(Strange("base_tilts"), seed, "late base", first=("base_tilts",))
     for seed in (99_200_002, 99_200_003):
         slips, early = Strange("encoder_slips", 20.0), Strange("soak_too_early", 20.0)
         yield Row(slips, seed, "slips under load", first=("slips_under_load",), unexplained=frozenset())
         yield Row(early, seed + 100_000, "soak too early", first=("soak_too_early",), unexplained=frozenset())
     also = changes.may_be_of_the_station
     missed = "an offset of the encoder is named beside two poses that are off, in place of the slip"
-    yield Row(Strange("encoder_slips", 20.0), 95_001, "encoder slips", physics=True, also=also, not_reached=missed)
+    yield physical(Strange("encoder_slips", 20.0), 95_001, "encoder slips", also=also, not_reached=missed)
     for world in (*map(Hand, ("warm_up", "temperature_curve", "lag", "cubic")), Hand("friction", rests=True)):
         missed = (
             "of the class the fifth order leads by more than 4, and is recommended" if world.effect == "cubic" else ""
         )
         also = changes.right_of(world.effect)
-        yield Row(world, 77, f"{world.effect} by hand", physics=True, also=also, not_reached=missed)
-    # without a rest of the temperature friction and a lag are one class
-    yield Row(Hand("friction"), 77, "friction without rests by hand", named=("thermal_hysteresis",), physics=True)
+        yield physical(world, 77, f"{world.effect} by hand", also=also, not_reached=missed)
+    yield physical(Hand("friction"), 77, "friction without rests by hand", named=("thermal_hysteresis",))
     warm = Recording(40, "white 280, B 30", warm_up=2000.0)
     for seed in (5_150_006, 5_150_012):
-        yield Row(warm, seed, "warm-up", named=("warm_up",), physics=True, also=changes.one_class_is_named)
+        yield physical(warm, seed, "warm-up", named=("warm_up",), also=changes.one_class_is_named)
     bad = Recording(24, "white 25, B 30", bad=1, bad_ug=5000.0)
     also = changes.bad_dwell_is_the_spoilt_one
     yield Row(bad, 5_150_002, "no warm-up", first=("bad_dwell",), alone=True, also=also)
-    # what follows the sequence of the poses is no driver
-    yield Row(Strange("sticking_pivot", 6.0), 12, "sticking pivot", physics=True, also=changes.pose_is_the_driver)
+    yield physical(Strange("sticking_pivot", 6.0), 12, "sticking pivot", also=changes.pose_is_the_driver)

@@ -7,23 +7,25 @@ from small_station import lot_of, plant_of, station_of, write
 from stations.plant.hidden.device import Creep, HysteresisPlay
 
 TOTAL_US = 40_000_000
+STORY = [  # when, on which device and what is written
+    (2_000_000, 3, "set_point", 40.0),
+    (5_250_001, 10, "rate", 100.0),
+    (5_250_001, 10, "sampling", "running"),
+    (TOTAL_US - 3_000_000, 10, "sampling", "stopped"),
+]
 
 
-def drive(cuts, *, look=False, state=None):
-    """A plant taken through a fixed story, its sleeps cut at ``cuts``; everything that can be read at the end."""
+def drive(cuts, *, look=False, state=None, until=TOTAL_US):
+    """A plant taken through the story, its sleeps cut at ``cuts``; everything that can be read at the end."""
     plant = plant_of(station_of(), lot_of(2), hidden=[Creep(), HysteresisPlay()], resume=state)
-    story = (
-        []
-        if state
-        else [(2_000_000, 3, "set_point", 40.0), (5_250_001, 10, "rate", 100.0), (5_250_001, 10, "sampling", "running")]
-    )
-    story += [(TOTAL_US - 3_000_000, 10, "sampling", "stopped")]
-    times = sorted({*(c for c in cuts if c >= plant.now_us), *(t for t, *_ in story), TOTAL_US})
-    for time in times:
+    begun = plant.now_us
+    for time in sorted({*cuts, *(at for at, *_ in STORY), until}):
+        if not begun <= time <= until:
+            continue
         plant.advance(time - plant.now_us)
         if look:
             everything(plant)
-        for at, device_id, name, value in story:
+        for at, device_id, name, value in STORY:
             if at == time:
                 write(plant, device_id, name, value)
     return plant, everything(plant)
@@ -52,15 +54,7 @@ def test_chopped_sleeps_and_looks_leave_no_trace(cuts):
 @given(st.integers(5_250_002, TOTAL_US - 3_000_001))
 @settings(max_examples=4, deadline=None)
 def test_a_resumed_plant_goes_on_bit_for_bit(at):
-    plant = plant_of(station_of(), lot_of(2), hidden=[Creep(), HysteresisPlay()])
-    for time, device_id, name, value in [
-        (2_000_000, 3, "set_point", 40.0),
-        (5_250_001, 10, "rate", 100.0),
-        (5_250_001, 10, "sampling", "running"),
-    ]:
-        plant.advance(time - plant.now_us)
-        write(plant, device_id, name, value)
-    plant.advance(at - plant.now_us)
+    plant, _ = drive([], until=at)
     assert drive([], state=plant.journal.state(plant.now_us))[1] == WHOLE
 
 

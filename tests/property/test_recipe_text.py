@@ -82,7 +82,6 @@ ASKED = {"bias": "bias_ug", "scale": "scale_ppm", "misalignment": "misalignment_
 
 
 def stops(effects):
-    """What is to be known of a model with these effects."""
     asked = {name: maybe(numbers(1.0, 1e4)) for effect, name in ASKED.items() if effect in effects}
     visible = st.lists(st.sampled_from(["third_order", "thermal_lag"]), max_size=2, unique=True)
     return st.builds(StopTerms, visible=visible, longest_dwell_s=maybe(numbers(1.0, 100.0)), **asked)
@@ -90,7 +89,6 @@ def stops(effects):
 
 @st.composite
 def soaks(draw, poses, verification):
-    """What is measured at one soak, with waits and pauses for its poses."""
     own = draw(maybe(st.lists(st.integers(1, poses), min_size=1, max_size=4)))
     count = poses if own is None else len(own)
     each = st.lists(numbers(0.0, 900.0), min_size=count, max_size=count)

@@ -39,7 +39,6 @@ def hashes(run: Run) -> dict[str, str]:
 def test_a_way_round_does_not_matter(
     first: str, then: str, original: Run, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """The bytes of a model are those that it has from the first run, even where it is reached over another model."""
     direct, round_about = (copied(original, tmp_path_factory) for _ in range(2))
     straight = again(direct, original.id, change_from_options(effects=then)).new
     over = again(round_about, original.id, change_from_options(effects=first)).new

@@ -1,13 +1,12 @@
 """Restricted deviances by products of columns are those of the whitened series, for every model and any shares of the noise."""
 
-import sys
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_worlds import BASE, Noise, World, make
 
 from inertial import effects as catalogue
 from inertial.criticism.examination import ExaminedRun
@@ -15,17 +14,10 @@ from inertial.criticism.unknown import suspects
 from inertial.data_errors.handling.gain_step import GainStep
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Shares
-from inertial.estimation.share_statistics import ShareStatistics
 from inertial.estimation.shares import _deviance_of_block, own_shares, shares_at
 from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
-
-from noise import Noise
-from world import World, make
-
-BASE = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
 CUBIC = Term(catalogue.get("third_order"))
 SLOW = Term(catalogue.get("aging_linear"))
 PLAY = Term(catalogue.get("thermal_hysteresis"), (("half_width", 12.0),), 1, rest=True)
@@ -34,7 +26,6 @@ GAIN = Term(GainStep(), (("unit", 1.0), ("dwell", 30.0)))
 
 @cache
 def base(*, gaps: bool) -> Model:
-    """The judged model of a lot of three units with a cubic, in part without some of their dwells."""
     made = make(World(units=3, noise=Noise(white=60.0, flicker=30.0), hidden=(("third_order", 2.0),)), 5_950_001)
     dwells = made.dwells
     if gaps:
@@ -44,13 +35,11 @@ def base(*, gaps: bool) -> Model:
 
 
 def curves(model: Model) -> np.ndarray:
-    """A curve of its own for every block."""
     time = np.linspace(-1.0, 1.0, model.problem.n)
     return np.stack([np.sin(k + 3.0 * time) for k in range(model.problem.blocks)])[..., None]
 
 
 def of_the_table(model: Model) -> np.ndarray:
-    """The columns of a curve over a table angle, which all blocks share."""
     (suspect, *_) = [s for s in suspects(model.problem) if s.candidate.shared]
     return suspect.candidate.of_blocks[:, :, 0]
 
@@ -106,24 +95,19 @@ def test_shares_of_single_blocks_by_products_are_those_of_the_whitened_series(na
     series = y - model.shared @ space.shared_sizes if model._joined else y
     quick = model._by_products(lot)
     assert quick(0, Shares(3.0, 0.0)) is not None
-    differences = [
-        [of(block, Shares(3.0, 1.0)) - of(block, lot) for block in range(model.problem.blocks)]
-        for of in (
-            lambda block, shares: (
-                quick(block, shares) + model.problem.covariance.whitener_of_block(block, shares).logdet
-            ),
-            lambda block, shares: _alone(model, series, block, shares),
-        )
-    ]
-    np.testing.assert_allclose(differences[0], differences[1], atol=1e-6)
+
+    def by_products(block: int, shares: Shares) -> float:
+        return quick(block, shares) + model.problem.covariance.whitener_of_block(block, shares).logdet
+
+    def of_series(block: int, shares: Shares) -> float:
+        columns = np.concatenate([model.local[block], series[block][:, None]], axis=1)
+        return _deviance_of_block(model.problem, block, columns, shares)
+
+    for block in range(model.problem.blocks):
+        apart, true = (of(block, Shares(3.0, 1.0)) - of(block, lot) for of in (by_products, of_series))
+        assert apart == pytest.approx(true, rel=1e-7, abs=1e-6)
     found = [own_shares(model.problem, series, model.local, space, of) for of in (quick, lambda *_: None)]
     assert found[0] == found[1]
-
-
-def _alone(model: Model, series: np.ndarray, block: int, shares: Shares) -> float:
-    return _deviance_of_block(
-        model.problem, block, np.concatenate([model.local[block], series[block][:, None]], axis=1), shares
-    )
 
 
 def test_what_is_known_of_equal_models_is_what_each_of_them_finds() -> None:
@@ -138,12 +122,3 @@ def test_what_is_known_of_equal_models_is_what_each_of_them_finds() -> None:
 
 
 PLACES = [(4, None), (0, 8), (None, 16), (12, 4), (-8, -8)]
-
-
-def test_columns_of_the_table_span_fewer_directions_than_they_are() -> None:
-    model = base(gaps=False)
-    columns = of_the_table(model)
-    found = ShareStatistics(model.problem, model.local, np.concatenate([columns, columns], axis=-1))._directions
-    assert 0 < found.shape[-1] <= columns.shape[-1]
-    flat = found.reshape(-1, found.shape[-1])
-    np.testing.assert_allclose(flat.T @ flat, np.eye(found.shape[-1]), atol=1e-9)

@@ -37,7 +37,6 @@ WORLDS: dict[str, Physics | None] = {
 
 @cache
 def measured(world: str) -> pd.DataFrame:
-    """Two units at one temperature with their reference in their own axes."""
     frame = lot(np.random.default_rng(5), units=2, temperatures=(25.0,), hidden=WORLDS[world])
     outer, inner = np.radians(frame["outer_deg"]), np.radians(frame["inner_deg"])
     force = np.stack([np.sin(outer) * np.sin(inner), np.sin(outer) * np.cos(inner), np.cos(outer)], axis=1)
@@ -46,7 +45,6 @@ def measured(world: str) -> pd.DataFrame:
 
 
 def verdict(frame: pd.DataFrame) -> dict[str, Any]:
-    """What is said of the model, and the numbers that it rests on."""
     document = diagnose(frame)
     return {
         "adequate": document["adequate"],
@@ -117,7 +115,5 @@ def test_a_verdict_stays_with(change: Change, world: str, data: st.DataObject) -
 
 
 def test_the_worlds_have_the_verdicts_that_they_were_made_for() -> None:
-    found = {world: (expected(world)["adequate"], expected(world)["recommended"]) for world in WORLDS}
-    assert found["nothing hidden"] == (True, [])
-    assert found["a cubic"] == (False, ["third_order"])
-    assert found["a square"] == (False, ["second_order"])
+    found = [(expected(world)["adequate"], expected(world)["recommended"]) for world in WORLDS]
+    assert found == [(True, []), (False, ["third_order"]), (False, ["second_order"])]

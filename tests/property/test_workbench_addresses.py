@@ -12,14 +12,10 @@ from pipelines.workbench.state import MissingPage, PageState, UnitsPage
 
 PAGES = sorted(PageState.__subclasses__(), key=lambda kind: kind.__name__)
 
-CALM = settings(
-    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)  # the first texts load a table
+# the first texts load a table
+CALM = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
-VALUES = {
-    "texts": st.lists(TEXT.filter(bool), max_size=4, unique=True).map(tuple),
-    "date": st.sampled_from(["", "2026-11-22", "1999-01-31"]),
-}
+TEXTS, DATE = st.lists(TEXT.filter(bool), max_size=4, unique=True).map(tuple), st.sampled_from(["", "2026-11-22"])
 
 
 def states(kind: type[PageState]) -> st.SearchStrategy[PageState]:
@@ -27,7 +23,7 @@ def states(kind: type[PageState]) -> st.SearchStrategy[PageState]:
     for name, field in kind.model_fields.items():
         said = str(field.annotation)
         if "tuple" in said:
-            made[name] = VALUES["texts"]
+            made[name] = TEXTS
         elif "Literal" in said:
             made[name] = st.sampled_from(list(TypeAdapter(field.annotation).json_schema()["enum"]))
         elif field.annotation is int:
@@ -35,7 +31,7 @@ def states(kind: type[PageState]) -> st.SearchStrategy[PageState]:
         elif field.annotation is float:
             made[name] = st.floats(0.0, 20.0)
         else:
-            made[name] = VALUES["date"] if name in {"since", "until"} else TEXT
+            made[name] = DATE if name in {"since", "until"} else TEXT
     return st.fixed_dictionaries(made).map(lambda values: kind(**values))
 
 
@@ -73,13 +69,3 @@ def test_a_broken_value_is_left_out_and_said() -> None:
     assert state == UnitsPage(search="a")
     assert len(problems) == 2
     assert MissingPage.parse([("added", "third_order")] * 2) == (MissingPage(added=("third_order",)), [])
-
-
-def test_the_command_of_a_diagnosis_names_model_formula_and_dwells_left_out() -> None:
-    state = MissingPage(
-        source="r", effects=("bias",), added=("third_order",), without=("U 1:3",), formula=("a = hours**2",)
-    )
-    assert shlex.split(state.command("A")) == [
-        *("tumbleline", "diagnose", "r", "--effects", "bias,third_order", "--formula", "a = hours**2"),
-        *("--leave-out", "U 1:3", "--archive", "A"),
-    ]

@@ -23,7 +23,6 @@ A_YEAR = np.repeat([250.0, 120.0, 0.02, 0.0, 2.0, 3.0], 3)
 
 
 def calibrations(serials, days, values, *, stations=None, slots=None, runs=None, errors=REPEAT):
-    """Calibrations in the audit's order."""
     serials, days, values = np.asarray(serials, dtype=object), np.asarray(days, dtype=float), np.asarray(values)
     order = np.lexsort((days, serials.astype(str)))
     n = len(order)
@@ -51,7 +50,6 @@ def disagreeing(histories):
 
 
 def yearly(rng, units, years=2.0, times=2):
-    """Serials, days and parameters of units that come back after some years, and drift in between."""
     base, slope = (sd * rng.standard_normal((units, 1, len(NAMES))) for sd in (BETWEEN, A_YEAR))
     t = years * np.arange(times)
     values = base + slope * t[:, None] + REPEAT * rng.standard_normal((units, times, len(NAMES)))
@@ -61,7 +59,6 @@ def yearly(rng, units, years=2.0, times=2):
 
 
 def weekly(rng, standards, weeks=100):
-    """Check standards that do not drift, every week."""
     values = BETWEEN * rng.standard_normal((standards, 1, len(NAMES)))
     values = values + REPEAT * rng.standard_normal((standards, weeks, len(NAMES)))
     days = np.tile(200.0 + 7.0 * np.arange(weeks), standards)
@@ -73,7 +70,6 @@ def joined(*parts):
 
 
 def test_two_years_of_drift_beside_weekly_standards_make_no_strangers(rng):
-    """With one usual change for all times the weekly standards made strangers of every second unit."""
     assert strangers(calibrations(*joined(yearly(rng, 300), weekly(rng, 4)))) == []
 
 
@@ -81,21 +77,19 @@ def test_exchanged_serials_are_found_beside_weekly_standards(rng):
     serials, days, values = yearly(rng, 300)
     values[[1, 3]] = values[[3, 1]]
     histories = calibrations(*joined((serials, days, values), weekly(rng, 4)))
-    strange = strangers(histories)
-    told = sorted((histories.unit[s.row], s.looks_like, s.exchanged) for s in strange)
+    told = sorted((histories.unit[s.row], s.looks_like, s.exchanged) for s in strangers(histories))
     assert told == [("U00000", "U00001", True), ("U00001", "U00000", True)]
 
 
 @pytest.mark.parametrize("ratio", [8.0, 20.0])
 def test_a_broken_unit_among_many_alike_is_not_taken_for_another(rng, ratio):
-    """Of 2000 units known by three biases some other is always near: seven broken units in ten passed for exchanged ones."""
     wrong = 0
     for _ in range(6):
         values = np.zeros((2000, 2, len(NAMES)))
         values[..., :3] = ratio * 60.0 * rng.standard_normal((2000, 1, 3)) + 60.0 * rng.standard_normal((2000, 2, 3))
         values[100, 1, :3] += 60.0 * ratio * rng.choice([-1.5, 1.5], 3)
-        serials = named(2000, 2)
-        histories = calibrations(serials, np.tile([200.0, 565.0], 2000), values.reshape(-1, len(NAMES)))
+        days = np.tile([200.0, 565.0], 2000)
+        histories = calibrations(named(2000, 2), days, values.reshape(-1, len(NAMES)))
         strange = [s for s in strangers(histories) if histories.unit[s.row] == "U00100"]
         wrong += any(s.looks_like for s in strange)
     assert wrong <= 2
@@ -107,7 +101,6 @@ TOLERANCE = np.repeat([1500.0, 1000.0, 1.0, 1.0, 60.0, 60.0], 3)
 @pytest.mark.parametrize(("slope", "walk"), [(0.25, 0.0), (0.0, 0.3), (0.15, 0.2)], ids=["slope", "walk", "both"])
 @pytest.mark.parametrize("times", mostly_slow([2, 4], 2))
 def test_units_are_in_tolerance_when_their_reliability_ends(rng, slope, walk, times):
-    """Units that come back once a year: in every parameter by itself, or taken for mounting, two in five had left it by then."""
     units, seating = 300, 0.05
     slopes = slope * rng.standard_normal((units, 1, len(NAMES)))
     steps = walk * rng.standard_normal((units, times, len(NAMES))) * (np.arange(times) > 0)[:, None]
@@ -129,15 +122,12 @@ def test_units_are_in_tolerance_when_their_reliability_ends(rng, slope, walk, ti
 
 @pytest.mark.parametrize("stated", [1.0, 0.2], ids=["stated rightly", "stated as a fifth"])
 def test_units_that_stand_still_agree_in_nineteen_of_twenty(rng, stated):
-    """With k = 2 and seating known from few pairs, 8 % of the calibrations of 20 units disagreed where σ was stated too small."""
     beyond = []
     for _ in range(8):
         units, times = 20, 3
         values = REPEAT * rng.standard_normal((units * times, len(NAMES)))
         days = np.cumsum(rng.uniform(100.0, 300.0, (units, times)), axis=1).ravel()
-        serials = named(units, times)
-        histories = calibrations(serials, days, values, errors=stated * REPEAT)
-        beyond += disagreeing(histories)
+        beyond += disagreeing(calibrations(named(units, times), days, values, errors=stated * REPEAT))
     assert len(beyond) == 8 * len(OF_UNIT)
     assert np.mean(beyond) < 0.062
 
@@ -145,7 +135,6 @@ def test_units_that_stand_still_agree_in_nineteen_of_twenty(rng, stated):
 @pytest.mark.parametrize("units", [8, 60])
 @pytest.mark.parametrize("kind", mostly_slow(["white", "correlated", "flicker"], "correlated"))
 def test_second_calibrations_agree_in_nineteen_of_twenty(rng, kind, units):
-    """Units without drift whose stated uncertainty is a fifth of their scatter: 10 to 25 % disagreed before."""
     beyond = []
     for _ in range(6):
         days = np.cumsum(rng.uniform(100.0, 300.0, (units, 2)), axis=1)
@@ -157,22 +146,19 @@ def test_second_calibrations_agree_in_nineteen_of_twenty(rng, kind, units):
         else:
             memory = 0.6 if kind == "correlated" else 0.0
             pair = np.swapaxes(made.autoregressive(rng, rows, 2, memory).reshape(units, len(NAMES), 2), 1, 2)
-        serials = named(units, 2)
         values = (REPEAT * pair).reshape(-1, len(NAMES))
-        histories = calibrations(serials, days.ravel(), values, errors=0.2 * REPEAT)
-        beyond += disagreeing(histories)
+        beyond += disagreeing(calibrations(named(units, 2), days.ravel(), values, errors=0.2 * REPEAT))
     assert len(beyond) == 6 * len(OF_UNIT)
     assert np.mean(beyond) < 0.065
 
 
 def test_units_that_wander_disagree_all_the_same(rng):
-    """A random walk of a kind's parameters between calibrations at three and more times is no seating."""
     units, times = 60, 4
     days = np.cumsum(rng.uniform(100.0, 600.0, (units, times)), axis=1)
     steps = np.sqrt(np.diff(days, axis=1, prepend=days[:, :1]) / 200.0)[..., None]
     values = np.cumsum(steps * REPEAT * rng.standard_normal((units, times, len(NAMES))), axis=1)
-    serials = named(units, times)
-    histories = calibrations(serials, days.ravel(), values.reshape(-1, len(NAMES)), errors=0.2 * REPEAT)
+    values = values.reshape(-1, len(NAMES))
+    histories = calibrations(named(units, times), days.ravel(), values, errors=0.2 * REPEAT)
     assert np.mean(disagreeing(histories)) > 0.3
 
 
@@ -185,23 +171,18 @@ def told_different(every, columns):
     names = np.repeat(np.array([f"figure_{k}" for k in range(len(columns))], dtype=object), n)
     texts = np.full(names.size, "1", dtype=object)
     rows = np.tile(np.arange(n), len(columns))
-    able, differences = abilities(
-        every, Figures(rows, names, np.concatenate(columns), np.full(names.size, LIMIT), texts)
-    )
+    figures = Figures(rows, names, np.concatenate(columns), np.full(names.size, LIMIT), texts)
+    able, differences = abilities(every, figures)
     held = np.mean([one.ppk.low <= LIMIT / 3.0 <= one.ppk.high for one in able])
     return any(one.by != "lot" and one.p < 1e-3 and one.comparison.effect > 0.02 for one in differences), held
 
 
 def test_units_that_come_back_to_their_station_are_no_evidence_against_it(rng):
-    """Every calibration counted as a new unit: each such archive had stations that differed, and Ppk held in 60 %."""
-    wrong, held = 0, []
+    wrong, held, units, times = 0, [], 60, 5
+    serials, days, nothing = named(units, times), np.tile(180.0 * np.arange(times), units), np.zeros((300, len(NAMES)))
     for _ in range(25):
-        units, times = 60, 5
         seat = np.repeat(rng.integers(0, 24, units), times)
-        serials = named(units, times)
-        days, nothing = np.tile(180.0 * np.arange(times), units), np.zeros((units * times, len(NAMES)))
-        stations = [f"line-{one}" for one in seat // 8]
-        every = calibrations(serials, days, nothing, stations=stations, slots=seat % 8)
+        every = calibrations(serials, days, nothing, stations=[f"line-{one}" for one in seat // 8], slots=seat % 8)
         own = [np.repeat(rng.standard_normal(units), times) + 0.05 * rng.standard_normal(300) for _ in range(FIGURES)]
         told, share = told_different(every, own)
         wrong, held = wrong + told, [*held, share]
@@ -211,15 +192,12 @@ def test_units_that_come_back_to_their_station_are_no_evidence_against_it(rng):
 
 @pytest.mark.slow
 def test_lots_that_differ_are_no_evidence_against_their_stations(rng):
-    """Units of a lot counted one by one: seven archives in ten had stations that differed, and Ppk held in 76 %."""
     wrong, held, lots, size = 0, [], 30, 8
+    lot, slots = np.repeat(np.arange(lots), size), np.tile(np.arange(size), lots)
+    serials, nothing, runs = named(lot.size), np.zeros((lot.size, len(NAMES))), [f"r{one:03d}" for one in lot]
     for _ in range(25):
-        lot = np.repeat(np.arange(lots), size)
-        serials = named(lot.size)
         stations = np.array([f"line-{one}" for one in rng.integers(0, 3, lots)])[lot]
-        nothing = np.zeros((lot.size, len(NAMES)))
-        runs = [f"r{one:03d}" for one in lot]
-        every = calibrations(serials, lot, nothing, stations=stations, slots=np.tile(np.arange(size), lots), runs=runs)
+        every = calibrations(serials, lot, nothing, stations=stations, slots=slots, runs=runs)
         own = [(rng.standard_normal(lot.size) + rng.standard_normal(lots)[lot]) / np.sqrt(2.0) for _ in range(FIGURES)]
         told, share = told_different(every, own)
         wrong, held = wrong + told, [*held, share]
@@ -229,13 +207,11 @@ def test_lots_that_differ_are_no_evidence_against_their_stations(rng):
 
 @pytest.mark.parametrize("differing", [0.0, 1.0])
 def test_large_lots_stand_out_no_more_than_small_ones(rng, differing):
-    """Distances multiplied by the root of a lot's size made four odd lots of 150, where lots differ as much as units do."""
     odd_lots = 0
     for _ in range(4):
         lot = np.repeat(np.arange(150), rng.choice([4, 8, 32], 150, p=[0.2, 0.6, 0.2]))
         values = rng.standard_normal((lot.size, len(NAMES))) + differing * rng.standard_normal((150, len(NAMES)))[lot]
-        serials, runs = named(lot.size), [f"r{one:03d}" for one in lot]
-        every = calibrations(serials, lot, values, runs=runs)
+        every = calibrations(named(lot.size), lot, values, runs=[f"r{one:03d}" for one in lot])
         odd_lots += sum(odd.kind == "lot" for odd in odd_ones(every, np.ones(len(every), dtype=bool)))
     assert odd_lots <= 1
 
@@ -243,7 +219,6 @@ def test_large_lots_stand_out_no_more_than_small_ones(rng, differing):
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "counted"), mostly_slow([(60, 20), (200, 160)], (60, 20)))
 def test_charts_in_control_are_found_out_of_it_as_rarely_as_is_said(rng, n, counted):
-    """By mean and variance of the number of alarms a p-value of 6·10⁻⁴, that of eighteen charts, came up 16 times as often."""
     chance, which = false_alarms(n, 40, counted), np.arange(n) >= n - counted
     p_values = []
     for values in rng.standard_normal((2000, n)):
@@ -260,7 +235,6 @@ def test_charts_in_control_are_found_out_of_it_as_rarely_as_is_said(rng, n, coun
 @pytest.mark.slow
 @pytest.mark.parametrize("n", mostly_slow([8, 16, 60], 8))
 def test_short_series_change_their_level_no_oftener_than_is_said(rng, n):
-    """With σ from a few differences and the normal tail a p-value of 10⁻⁴ came up 30 times as often in eight points."""
     changes = [change_points(values, 1e-2) for values in rng.standard_normal((2000, n))]
     p = np.array([min((change.p_value for change in own), default=1.0) for own in changes])
     assert np.mean(p < 1e-2) < 0.01

@@ -142,3 +142,7 @@ def test_sigma_holm_s_steps_and_e_n_are_those_of_their_formulas(rng):
     assert holm(np.array([0.01, 0.04, 0.03, 0.005])) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     # ISO/IEC 17043 B.3.1.3 with expanded uncertainties 0.3 and 0.4: 0.5 apart is exactly one
     assert e_n(np.array([10.5]), np.array([10.0]), np.array([0.15]), np.array([0.2]))[0] == pytest.approx(1.0)
+    assert holm(np.array([0.001, np.nan, 0.2])) == pytest.approx([0.003, 1.0, 0.4])  # one could not be compared
+    one = np.ones(1)
+    for dof, factor in ((2.0, 4.53), (5.0, 2.65), (10.0, 2.28)):  # JCGM 100, table G.2, 95.45 %
+        assert e_n(one, 0.0 * one, one, 0.0 * one, dof)[0] == pytest.approx(1.0 / factor, rel=2e-3)

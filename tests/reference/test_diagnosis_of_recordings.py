@@ -1,10 +1,11 @@
 """Real recordings with known hidden effects: what is missing is named, and the error falls to what was published."""
 
+import numpy as np
 import pytest
 
 from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.importers import exchange
+from pipelines.importers import exchange, files
 
 MM_S2 = 9.80665e-3
 """One µg in mm/s²."""
@@ -15,19 +16,11 @@ CUBIC = ("bias", "bias_temperature", "bias_temperature_quadratic", "bias_tempera
 @pytest.fixture
 def chamber(shared_data):
     """The ramp of a chamber cycle, every reading a dwell of its own: one unit, one pose, about 2 Hz."""
-    from pipelines.importers import files
-
     table, _ = files.read(shared_data / "chamber-cycle" / "imu_raw_data.csv")
-    return _as_dwells(table)
-
-
-def _as_dwells(table):
     out = table[["imu.acc.x", "imu.acc.y", "imu.acc.z"]].set_axis(["out_x", "out_y", "out_z"], axis=1)
     time = (table["timestamp"] - table["timestamp"].iloc[0]) * 1e-6
-    frame = out.assign(
-        unit="IMU", dwell=range(len(out)), time_s=time, unit_C=table["imu.temperature"], n=1, out_unit="m/s^2"
-    )
-    return exchange.checked(frame.assign(force_x=0.0, force_y=0.0, force_z=-1.0), where="chamber cycle")
+    frame = out.assign(dwell=range(len(out)), time_s=time, unit_C=table["imu.temperature"], force_x=0.0, force_y=0.0)
+    return exchange.checked(frame.assign(unit="IMU", n=1, out_unit="m/s^2", force_z=-1.0), where="chamber cycle")
 
 
 def test_a_lag_fitted_per_axis_takes_the_chamber_cycle_to_the_published_residuals(chamber):
@@ -52,14 +45,11 @@ def test_the_rate_of_temperature_drives_the_chamber_cycle_and_a_lag_is_named(cha
 
 @pytest.mark.slow
 def test_the_temperature_offset_of_a_worn_unit_is_found_missing(shared_data):
-    from pipelines.importers import files
-
     table, _ = files.read(shared_data / "worn-unit" / "static_windows.csv.gz")
     names = {"meanx": "out_x", "meany": "out_y", "meanz": "out_z", "sdx": "sd_x", "sdy": "sd_y", "sdz": "sd_z"}
     frame = table.rename(columns={**names, "temperature": "unit_C"}).drop(columns="window")
-    frame = frame.assign(
-        unit="worn", dwell=range(len(frame)), time_s=[10.0 * k for k in range(len(frame))], n=1, out_unit="g"
-    )
+    dwell = np.arange(len(frame))
+    frame = frame.assign(unit="worn", dwell=dwell, time_s=10.0 * dwell, n=1, out_unit="g")
     diagnosis = diagnose(exchange.checked(frame, where="worn unit"), effects=["bias", "scale"])
     assert not diagnosis["adequate"]
     named = {e for c in diagnosis["classes"] for e in c["effects"]}

@@ -30,10 +30,6 @@ RANKS = {"six": (6, 6, 6), "orthogonal24": (6, 6, 6), "twelve": (9, 12, 12), "ei
          "twenty_six": (9, 16, 22), "fibonacci24": (9, 16, 24)}  # fmt: skip
 
 
-def planned(name):
-    return state_of(poses.plan(name))
-
-
 def state_of(degrees):
     """Dwells in poses of these angles, 30 s apart at 25 °C."""
     return posed(degrees, 30.0, temperature=np.full(len(degrees), 25.0))
@@ -47,7 +43,7 @@ def monomials(force, degree):
 
 @pytest.mark.parametrize("name", TABLE)
 def test_the_table_of_identifiability_and_the_ranks_of_polynomials_on_the_sphere_are_reproduced(name):
-    state = planned(name)
+    state = state_of(poses.plan(name))
     for axis in range(3):
         base = np.concatenate([np.ones((len(state.time), 1)), state.force], axis=1)
         span = np.linalg.svd(base, full_matrices=False)[0]
@@ -164,9 +160,11 @@ FLOORS = {
 
 def test_three_sigma_floors_are_the_published_ones_also_under_the_same_noise_as_a_covariance():
     for (plan, effect), floor in FLOORS.items():
-        (sight,) = visibility.visibilities(planned(plan), BASE, 11.4e-6, [effect])
+        (sight,) = visibility.visibilities(state_of(poses.plan(plan)), BASE, 11.4e-6, [effect])
         assert sight.seen == np.isfinite(floor), (plan, effect)
         assert 1e6 * sight.floor == pytest.approx(floor, rel=0.05), (plan, effect)
-        n = len(planned(plan).time)
-        (given,) = visibility.visibilities(planned(plan), BASE, 1.0, [effect], covariance=11.4e-6**2 * np.eye(n))
+        n = len(state_of(poses.plan(plan)).time)
+        (given,) = visibility.visibilities(
+            state_of(poses.plan(plan)), BASE, 1.0, [effect], covariance=11.4e-6**2 * np.eye(n)
+        )
         assert given.floor == pytest.approx(sight.floor)

@@ -3,17 +3,7 @@
 import pytest
 
 from stations.links import frames
-from stations.links.frames import (
-    Malformed,
-    Refused,
-    crc16,
-    pack_bits,
-    read_request,
-    reply_size,
-    unpack_bits,
-    values_in,
-    write_request,
-)
+from stations.links.frames import Malformed, Refused, crc16, read_request, reply_size, values_in, write_request
 
 # Modbus Application Protocol 1.1b3: request, answer and what they mean
 READ_COILS = (bytes.fromhex("01 00 13 00 13"), bytes.fromhex("01 03 CD 6B 05"))  # 6.1
@@ -73,7 +63,7 @@ def test_the_check_of_a_serial_frame_is_that_of_the_specification():
 def test_bits_come_back():
     for n in (1, 7, 8, 9, 22):
         bits = [(i * 7 + n) % 3 % 2 for i in range(n)]
-        assert unpack_bits(pack_bits(bits), n) == bits
+        assert frames.unpack_bits(frames.pack_bits(bits), n) == bits
 
 
 def test_the_sign_that_is_asked_for_on_a_serial_line_is_the_example_of_the_specification() -> None:

@@ -8,7 +8,6 @@ LOOKS, DWELLS, MORE, UNITS = 6, 72, 8, 4000
 
 
 def test_six_looks_leave_the_wrong_rival_alone_in_less_than_one_run_of_a_thousand(rng):
-    """With a lead of 10 the wrong one stood alone in 3·10⁻⁴ at one look and in 4·10⁻³ at any of six."""
     true = [rng.standard_normal(size) for size in (DWELLS, *[MORE] * (LOOKS - 1))]
     wrong = [
         r * x + np.sqrt(1.0 - r**2) * rng.standard_normal(x.size) for r, x in zip([0.98, *[0.9] * 5], true, strict=True)

@@ -32,7 +32,6 @@ def slow(rng, kind, count):
 
 
 def dwells(rng, kind, hand_deg):
-    """The dwells of one recording, as an import makes them."""
     counts = rng.integers(200, 251, 6)
     first = np.cumsum(counts + MOVE) - counts
     noise = slow(rng, kind, int(first[-1] + counts[-1]))
@@ -44,14 +43,11 @@ def dwells(rng, kind, hand_deg):
         output = noise[start : start + count] + force / np.linalg.norm(force) + BIAS
         rows.append([k, (start + count / 2.0) / HZ, *output.mean(axis=0), *output.std(axis=0, ddof=1), count, *face])
     names = ["dwell", "time_s", "out_x", "out_y", "out_z", "sd_x", "sd_y", "sd_z", "n", "force_x", "force_y", "force_z"]
-    table = pd.DataFrame(rows, columns=names).assign(
-        unit="S1", kind="dwell", slot=0, soak=0, out_unit="g", duration_s=4.0
-    )
-    return table.assign(pose=[f"face {k}" for k in range(6)])
+    about = {"unit": "S1", "kind": "dwell", "slot": 0, "soak": 0, "out_unit": "g", "duration_s": 4.0}
+    return pd.DataFrame(rows, columns=names).assign(pose=[f"face {k}" for k in range(6)], **about)
 
 
 def biases(rng, kind, hand_deg, lots):
-    """Errors of the biases and their standard errors, (lots, 3)."""
     errors, stated = [], []
     for _ in range(lots):
         rows = fit(dwells(rng, kind, hand_deg), None, MODEL)["coefficients"].query("effect == 'bias'")

@@ -9,12 +9,14 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+from each import each
 from independent_budget import PRODUCTION, columns, draws, fitted, nominal_force, outputs
 from long_suites import mostly_slow
 from posed import posed
 
 from inertial import design, poses
 from inertial.state import State
+from inertial.uncertainty import period
 from inertial.uncertainty.degrees import coverage_factors, effective_degrees
 from inertial.uncertainty.influences import (
     Errors,
@@ -25,15 +27,7 @@ from inertial.uncertainty.influences import (
     sensitivity,
     theta,
 )
-from inertial.uncertainty.period import (
-    YEAR_S,
-    Windows,
-    bounded_walk,
-    flicker_later,
-    flicker_within,
-    logarithmic,
-    walk_later,
-)
+from inertial.uncertainty.period import YEAR_S, Windows, flicker_later, flicker_within
 from inertial.uncertainty.propagation import fit_design, norm_errors, propagated
 from inertial.uncertainty.risk import lot_risk
 from inertial.uncertainty.rounding import rounded
@@ -62,7 +56,6 @@ def unit(axis: int) -> tuple[float, float, float]:
 
 
 def station(state: State, s: dict[str, float]) -> tuple[list[InputQuantity], list[Scattered]]:
-    """The influences of a station of these standard uncertainties."""
     quantities = [
         InputQuantity("gravity", Errors(gravity=1.0), s["gravity"]),
         InputQuantity("level", Errors(level=(1.0, 0.0)), s["level_1"]),
@@ -90,7 +83,6 @@ def station(state: State, s: dict[str, float]) -> tuple[list[InputQuantity], lis
 
 
 def through(plan: str, influences=None, scattered=()):
-    """State, model of the fit, and the influences through the fit of a plan."""
     name, temperatures = PLANS[plan]
     state = state_of(poses.plan(name), temperatures)
     effects = BASE if len(temperatures) == 1 else BASE + WARM
@@ -163,14 +155,8 @@ def test_what_rules_the_bias_of_z_and_the_visible_shares() -> None:
     _, _, fit, influences = through("fib")
     names, errors = np.array(influences.source.contributions), 1e6 * influences.coefficients[2, 0]
     of_bias = {name: 100.0 * np.sum(errors[names == name] ** 2) / np.sum(errors**2) for name in set(names.tolist())}
-    expected = {
-        "level": 63.1,
-        "outer_offset": 22.7,
-        "harmonics": 9.7,
-        "thermometer_offset": 2.3,
-        "gradient": 1.0,
-        "pose": 0.7,
-    }
+    expected = {"level": 63.1, "outer_offset": 22.7, "harmonics": 9.7}
+    expected |= {"thermometer_offset": 2.3, "gradient": 1.0, "pose": 0.7}
     assert {name: of_bias[name] for name in expected} == pytest.approx(expected, abs=0.06)
     shares = fit.visible_share(influences.source.changes)
     for name in ("gravity", "thermometer_offset", "thermometer_slope", "supply", "gain"):
@@ -185,23 +171,24 @@ def moved(plan: str, errors) -> np.ndarray:
     return through(plan, lambda state: [InputQuantity("one", errors(state), 1.0)])[3].coefficients[..., 0]
 
 
-@pytest.mark.parametrize(
-    ("plan", "errors", "expected"),
-    [
-        ("six", Errors(gravity=1.0), {(0, 1): 1.0, (1, 1): 1.0, (2, 1): 1.0}),
-        ("six", Errors(level=(1.0, 0.0)), {(0, 2): 1.0, (1, 3): -1.0, (0, 0): 1 / 3}),
-        ("six", Errors(level=(0.0, 1.0)), {(2, 0): -2 / 3, (1, 2): 1.0}),
-        ("twelve", Errors(level=(1.0, 0.0)), {(0, 2): (1 + math.sqrt(2)) / 2, (1, 3): -(1 + math.sqrt(2)) / 2}),
-        ("twelve", Errors(level=(0.0, 1.0)), {(2, 0): -(1 + math.sqrt(2)) / 3}),
-        ("fib", Errors(level=(0.0, 1.0)), {(2, 0): -0.7875}),
-        ("six", Errors(orthogonality=1.0), {(0, 3): -1.0}),
-        ("six", Errors(inner=1.0), {(0, 2): 1.0, (1, 3): -1.0}),
-        ("fib", Errors(outer=1.0), {(2, 0): -0.7875}),
-        ("six", Errors(temperature=1.0), {(0, 0): -50e-6, (0, 1): -200e-6}),
-        ("twelve", Errors(temperature=1.0), {(0, 0): -50e-6, (0, 1): -200e-6}),
-    ],
-)
-def test_a_single_influence_moves_the_coefficients_by_its_closed_form(plan, errors, expected) -> None:
+MOVED = [
+    ("six", Errors(gravity=1.0), {(0, 1): 1.0, (1, 1): 1.0, (2, 1): 1.0}),
+    ("six", Errors(level=(1.0, 0.0)), {(0, 2): 1.0, (1, 3): -1.0, (0, 0): 1 / 3}),
+    ("six", Errors(level=(0.0, 1.0)), {(2, 0): -2 / 3, (1, 2): 1.0}),
+    ("twelve", Errors(level=(1.0, 0.0)), {(0, 2): (1 + math.sqrt(2)) / 2, (1, 3): -(1 + math.sqrt(2)) / 2}),
+    ("twelve", Errors(level=(0.0, 1.0)), {(2, 0): -(1 + math.sqrt(2)) / 3}),
+    ("fib", Errors(level=(0.0, 1.0)), {(2, 0): -0.7875}),
+    ("six", Errors(orthogonality=1.0), {(0, 3): -1.0}),
+    ("six", Errors(inner=1.0), {(0, 2): 1.0, (1, 3): -1.0}),
+    ("fib", Errors(outer=1.0), {(2, 0): -0.7875}),
+    ("six", Errors(temperature=1.0), {(0, 0): -50e-6, (0, 1): -200e-6}),
+    ("twelve", Errors(temperature=1.0), {(0, 0): -50e-6, (0, 1): -200e-6}),
+]
+
+
+@each(MOVED)
+def test_a_single_influence_moves_the_coefficients_by_its_closed_form(row) -> None:
+    plan, errors, expected = row
     got = moved(plan, lambda _state: errors)
     for where, value in expected.items():
         assert got[where] == pytest.approx(value, rel=2e-3, abs=2e-6)
@@ -227,10 +214,9 @@ SHOWN = [  # influence, size, error of the worst axis shown and true, of the nor
 ]
 
 
-@pytest.mark.parametrize(("name", "errors", "size", "shown", "true", "norm_shown", "norm_true"), SHOWN)
-def test_what_the_stations_own_verification_shows_of_an_error(
-    name, errors, size, shown, true, norm_shown, norm_true
-) -> None:
+@each(SHOWN)
+def test_what_the_stations_own_verification_shows_of_an_error(row) -> None:
+    name, errors, size, shown, true, norm_shown, norm_true = row
     _, effects, _, influences = through("fib", lambda state: [InputQuantity(name, errors(state), size)])
     at = state_of(np.array(VERIFICATION), PLANS["fib"][1])
     own = sensitivity(model_of(effects), at, [InputQuantity(name, errors(at), size)])
@@ -246,9 +232,8 @@ def test_what_the_stations_own_verification_shows_of_an_error(
 
 
 def test_a_rotation_of_the_whole_unit_is_no_error_in_its_own_frame() -> None:
-    _, effects, _, influences = through(
-        "fib", lambda state: [InputQuantity("seat", Errors(seat=unit(k)), 1e-3) for k in range(3)]
-    )
+    seats = [InputQuantity("seat", Errors(seat=unit(k)), 1e-3) for k in range(3)]
+    _, effects, _, influences = through("fib", lambda _: seats)
     at = state_of(np.array(VERIFICATION), (25.0,))
     columns_ = design.local_columns(design.split(effects)[0], at, {})
     fixture, own = (influences.user_errors(columns_, at.force, intrinsic=flag) for flag in (False, True))
@@ -299,10 +284,11 @@ RISKS = [  # mean, process, u, tolerance, acceptance, PFA, PFR, accepted
 ]
 
 
-@pytest.mark.parametrize(("mean", "process", "u", "tolerance", "accept", "pfa", "pfr", "accepted"), RISKS)
-def test_global_risks_are_those_of_suncal(mean, process, u, tolerance, accept, pfa, pfr, accepted) -> None:
+@each(RISKS)
+def test_global_risks_are_those_of_suncal(row) -> None:
+    mean, process, u, tolerance, accept, *risks = row
     risk = lot_risk(mean, process, u, 0.0, (-tolerance, tolerance), (-accept, accept))
-    assert (risk.pfa, risk.pfr, risk.accepted) == pytest.approx((pfa, pfr, accepted), abs=6e-9)
+    assert (risk.pfa, risk.pfr, risk.accepted) == pytest.approx(risks, abs=6e-9)
 
 
 def process_for(share: float) -> float:
@@ -318,14 +304,9 @@ def test_suncals_risks_by_share_in_tolerance_and_ratio() -> None:
         for share, pfa in zip((0.85, 0.90, 0.95, 0.99), expected, strict=True):
             got = lot_risk(0.0, process_for(share), 0.5 / ratio, 0.0, (-1.0, 1.0), (-1.0, 1.0)).pfa
             assert got == pytest.approx(pfa, abs=6e-7)
-    limits = (
-        (1.0, 0.85, 0.686236),
-        (1.0, 0.90, 0.792397),
-        (1.5, 0.85, 0.847477),
-        (2.0, 0.90, 0.973153),
-        (3.0, 0.85, 0.987788),
-    )
-    for ratio, share, limit in limits:  # acceptance limits for two per cent
+    ratios, shares = (1.0, 1.0, 1.5, 2.0, 3.0), (0.85, 0.90, 0.85, 0.90, 0.85)
+    limits = (0.686236, 0.792397, 0.847477, 0.973153, 0.987788)  # of acceptance, for two per cent
+    for ratio, share, limit in zip(ratios, shares, limits, strict=True):
         risk = lot_risk(0.0, process_for(share), 0.5 / ratio, 0.0, (-1.0, 1.0), (-limit, limit))
         assert risk.pfa == pytest.approx(0.02, abs=1e-6)
 
@@ -343,41 +324,40 @@ def effective_of(u, dof) -> float:
 def test_gum_h1() -> None:
     """End gauge: u_c 32 nm, ν_eff 16, k(99 %) 2.92, U 93 nm (JCGM 100, H.1.6)."""
     u, dof = [25.0, 5.8, 3.9, 6.7, 2.9, 16.6], [18, 24, 5, 8, 50, 2]
-    whole, effective = math.sqrt(sum(v * v for v in u)), effective_of(u, dof)
-    assert whole == pytest.approx(31.7, abs=0.05)
-    assert effective == pytest.approx(16.75, abs=0.01)
-    assert float(coverage_factors(np.asarray(effective), 0.99)) == pytest.approx(2.92, abs=0.005)
-    assert float(coverage_factors(np.asarray(effective), 0.99)) * whole == pytest.approx(92.5, abs=0.1)
+    whole, effective = math.hypot(*u), effective_of(u, dof)
+    factor = float(coverage_factors(np.asarray(effective), 0.99))
+    assert (whole, effective) == (pytest.approx(31.7, abs=0.05), pytest.approx(16.75, abs=0.01))
+    assert (factor, factor * whole) == (pytest.approx(2.92, abs=0.005), pytest.approx(92.5, abs=0.1))
 
 
-@pytest.mark.parametrize(
-    ("u", "dof", "effective", "k", "expanded"),
-    [
-        ((50, 40), (6, math.inf), 16.1376, 2.1689, 138.8801),
-        ((50, 40), (2, math.inf), 5.3792, 2.6487, 169.5966),
-        ((50, 40), (24, math.inf), 64.5502, 2.0398, 130.6125),
-        ((50, 40, 30), (6, 8, math.inf), 18.3599, 2.1489, 151.9468),
-    ],
-)
-def test_effective_degrees_of_freedom(u, dof, effective, k, expanded) -> None:
+EFFECTIVE = [  # standard uncertainties, degrees of freedom; effective ones, k and U
+    ((50, 40), (6, math.inf), 16.1376, 2.1689, 138.8801),
+    ((50, 40), (2, math.inf), 5.3792, 2.6487, 169.5966),
+    ((50, 40), (24, math.inf), 64.5502, 2.0398, 130.6125),
+    ((50, 40, 30), (6, 8, math.inf), 18.3599, 2.1489, 151.9468),
+]
+
+
+@each(EFFECTIVE)
+def test_effective_degrees_of_freedom(row) -> None:
+    u, dof, effective, k, expanded = row
     got = effective_of(u, dof)
+    factor = float(coverage_factors(np.asarray(got)))
     assert got == pytest.approx(effective, abs=5e-3)
-    assert float(coverage_factors(np.asarray(got))) == pytest.approx(k, abs=6e-5)
-    assert float(coverage_factors(np.asarray(got))) * math.sqrt(sum(v * v for v in u)) == pytest.approx(
-        expanded, abs=6e-3
-    )
+    assert factor == pytest.approx(k, abs=6e-5)
+    assert factor * math.hypot(*u) == pytest.approx(expanded, abs=6e-3)
 
 
-@pytest.mark.parametrize(
-    ("value", "expanded", "text"),
-    [
-        (485.37, 549.6, ("490", "550")), (0.99961234, 2.37e-5, ("0.999612", "0.000024")), (1234.5, 0.996, ("1234.5", "1.0")),
-        (-0.0049, 0.0104, ("-0.005", "0.010")), (42, 9.95, ("42", "10")), (12.345, 0.105, ("12.35", "0.11")),
-        (98765.4, 1234, ("98800", "1200")), (10.05762, 0.027, ("10.058", "0.027")), (-0.0004, 0.5, ("0.00", "0.50")),
-    ],
-)  # fmt: skip
-def test_rounding(value: float, expanded: float, text: tuple[str, str]) -> None:
-    assert rounded(value, expanded) == text
+ROUNDED = [
+    (485.37, 549.6, ("490", "550")), (0.99961234, 2.37e-5, ("0.999612", "0.000024")), (1234.5, 0.996, ("1234.5", "1.0")),
+    (-0.0049, 0.0104, ("-0.005", "0.010")), (42, 9.95, ("42", "10")), (12.345, 0.105, ("12.35", "0.11")),
+    (98765.4, 1234, ("98800", "1200")), (10.05762, 0.027, ("10.058", "0.027")), (-0.0004, 0.5, ("0.00", "0.50")),
+]  # fmt: skip
+
+
+@each(ROUNDED)
+def test_rounding(row: tuple[float, float, tuple[str, str]]) -> None:
+    assert rounded(*row[:2]) == row[2]
 
 
 FLICKER = [
@@ -386,45 +366,38 @@ FLICKER = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("calibration", "use", "gap", "u"), FLICKER)
-def test_flicker_to_the_due_date(calibration: float, use: float, gap: float, u: float) -> None:
-    assert flicker_later(Windows(calibration, use, gap)) == pytest.approx(u, abs=1e-6)
+@each(FLICKER)
+def test_flicker_to_the_due_date(row: tuple[float, float, float, float]) -> None:
+    assert flicker_later(Windows(*row[:3])) == pytest.approx(row[3], abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("b", "run_h", "in_run", "year", "switch_on", "whole"),
-    [(300, 2.5, 441, 865, 300, 916), (150, 4, 228, 429, 200, 473), (30, 5, 46, 85, 50, 99)],
-)
-def test_devices_over_twelve_months(b, run_h, in_run, year, switch_on, whole) -> None:
-    windows = Windows(3600.0 * run_h, 10.0, YEAR_S)
-    assert b * flicker_within(windows) == pytest.approx(in_run, abs=0.6)
-    assert b * flicker_later(windows) == pytest.approx(year, abs=0.6)
-    assert math.hypot(b * flicker_later(windows), switch_on) == pytest.approx(whole, abs=0.6)
+@each([(300, 2.5, 441, 865, 300, 916), (150, 4, 228, 429, 200, 473), (30, 5, 46, 85, 50, 99)])
+def test_devices_over_twelve_months(row) -> None:
+    b, run_h, in_run, year, switch_on, whole = row
+    within, later = (b * of(Windows(3600.0 * run_h, 10.0, YEAR_S)) for of in (flicker_within, flicker_later))
+    assert (within, later, math.hypot(later, switch_on)) == pytest.approx((in_run, year, whole), abs=0.6)
 
 
 def test_flicker_that_ends_at_a_time_constant_is_that_of_ornstein_uhlenbeck_processes() -> None:
     """Against the sum of processes itself: means of many simulated records, far apart."""
-    rng, slowest, b = np.random.default_rng(5), 400.0, 1.0
+    rng, slowest = np.random.default_rng(5), 400.0
     taus = slowest * 2.0 ** -np.arange(12)
     step, records, a, u = 2.0, 3000, 200, 10
-    x = np.sqrt(np.log(2.0) / np.pi) * b * rng.standard_normal((records, taus.size))
-    keep = np.exp(-step / taus)
-    first, second = np.zeros(records), np.zeros(records)
-    for _ in range(a):
-        x = keep * x + np.sqrt(np.log(2.0) / np.pi * (1 - keep**2)) * rng.standard_normal(x.shape)
-        first += x.sum(axis=1) / a
-    x = np.sqrt(np.log(2.0) / np.pi) * rng.standard_normal(x.shape)  # long after
-    for _ in range(u):
-        x = keep * x + np.sqrt(np.log(2.0) / np.pi * (1 - keep**2)) * rng.standard_normal(x.shape)
-        second += x.sum(axis=1) / u
+    keep, size, means = np.exp(-step / taus), np.sqrt(np.log(2.0) / np.pi), []
+    for count in (a, u):  # the second long after the first
+        x, mean = size * rng.standard_normal((records, taus.size)), np.zeros(records)
+        for _ in range(count):
+            x = keep * x + size * np.sqrt(1 - keep**2) * rng.standard_normal(x.shape)
+            mean += x.sum(axis=1) / count
+        means.append(mean)
     expected = flicker_later(Windows(a * step, u * step, 1e7), slowest)
-    assert np.std(second - first) == pytest.approx(expected, rel=0.06)
+    assert np.std(means[1] - means[0]) == pytest.approx(expected, rel=0.06)
 
 
 def test_walks_and_ageing() -> None:
-    assert walk_later(Windows(9000.0, 10.0, YEAR_S)) == pytest.approx(5618.0, abs=1.0)
-    assert logarithmic(50.0, YEAR_S) == pytest.approx(128.0, abs=0.2)
-    assert bounded_walk(1200.0, YEAR_S, YEAR_S) == pytest.approx(1349.0, abs=1.0)
+    assert period.walk_later(Windows(9000.0, 10.0, YEAR_S)) == pytest.approx(5618.0, abs=1.0)
+    assert period.logarithmic(50.0, YEAR_S) == pytest.approx(128.0, abs=0.2)
+    assert period.bounded_walk(1200.0, YEAR_S, YEAR_S) == pytest.approx(1349.0, abs=1.0)
 
 
 @pytest.mark.parametrize(("latitude", "gravity"), [(0, 9.7803267715), (45, 9.8061992025), (90, 9.8321863685)])

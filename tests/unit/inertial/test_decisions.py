@@ -12,7 +12,7 @@ from inertial import decisions
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.append(str(ROOT / "benchmarks"))  # last: tests have modules of the same names
 
-from characteristics import COMMANDS, DERIVED, how
+from characteristics import COMMANDS, how
 
 
 def stated() -> dict[str, str]:
@@ -42,13 +42,6 @@ def test_every_number_has_a_derivation_or_a_characteristic_with_its_command(name
     assert (ROOT / "benchmarks" / command.group(1)).exists() or (
         ROOT / "benchmarks" / f"{command.group(1)}.py"
     ).exists()
-
-
-@each(["COMMON", "CLASS_WIDTH", "ADEQUATE_ABOVE", "CONFIRMED", "PRIOR_DOF"])
-def test_simulations_of_a_decision_alone_run(name: str) -> None:
-    lines = list(DERIVED[name](1, 7))
-    assert lines
-    assert all(re.search(r"\[\d|95 %", line) for line in lines)
 
 
 def test_the_numbers_are_all_found_with_the_commands_that_they_state() -> None:

@@ -60,8 +60,8 @@ def test_each_disturbance_is_told_as_what_it_is_and_where(kind: str, seed: int) 
     (one,) = disturbances(spikes)
     assert (one.kind, one.count) == ("spikes", 5)
     assert one.size == pytest.approx(300.0, rel=0.05)
-    assert {part.kind for part in disturbances(loud)} == {"loud"}
     (one,) = disturbances(loud)
+    assert one.kind == "loud"
     assert abs(one.start - at) < 40
     assert abs(one.stop - at - 900) < 40
     (one,) = disturbances(stuck)
@@ -81,13 +81,8 @@ def test_steps_on_the_floor_are_bursts_and_one_of_them_is_none(kind: str, count:
     for k in at:
         record[k : k + 10] += 8.0 * np.cos(0.9 * np.pi * np.arange(10))
     found = disturbances(record)
-    if count == 1:
-        assert found == []
-        return
-    (one,) = found
-    assert (one.kind, one.count, one.material) == ("bursts", 10, False)
-    assert abs(one.start - at[0]) < 40
-    assert abs(one.stop - at[-1] - 10) < 40
+    assert [(one.kind, one.count, one.material) for one in found] == [("bursts", 10, False)] * (count > 1)
+    assert all(abs(one.start - at[0]) < 40 and abs(one.stop - at[-1] - 10) < 40 for one in found)
 
 
 def test_heavy_tails_are_no_bursts() -> None:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from each import each
 
-from inertial import effects
 from inertial.effects.formula import Formula
 from inertial.expressions import Expression, FormulaInvalid, UnknownName
 from inertial.state import State
@@ -71,15 +70,6 @@ def test_refuses_values_that_are_no_numbers_and_names_a_quantity_that_is_not_rec
 
 
 def test_a_formula_is_an_effect_like_others(state):
-    with effects.additions_forgotten():
-        effects.register(
-            Formula("humidity_bias", ["humidity_pct", "humidity_pct*f"], why="Moisture swells the glue.", symbol="h")
-        )
-        made = effects.get("humidity_bias")
-        assert made.columns(state, 1).shape == (2, 12, 2)
-        assert made.names(0) == ("h1", "h2")
-        assert made.__doc__ == "Moisture swells the glue."
-        assert made.equation == "h1·(humidity_pct) + h2·(humidity_pct*f)"
-        assert "humidity_bias" in effects.catalogue()
-        assert "humidity_bias" not in effects.built_in()
-    assert "humidity_bias" not in effects.catalogue()
+    made = Formula("humidity_bias", ["humidity_pct", "humidity_pct*f"], why="Moisture swells the glue.", symbol="h")
+    assert (made.columns(state, 1).shape, made.names(0)) == ((2, 12, 2), ("h1", "h2"))
+    assert made.equation == "h1·(humidity_pct) + h2·(humidity_pct*f)"

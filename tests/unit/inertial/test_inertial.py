@@ -1,11 +1,14 @@
-"""Small modules of the science: frames and poses, operators, correction and static intervals."""
+"""Small modules of the science: frames and poses, operators, correction, static intervals, positions of a motion."""
+
+from dataclasses import replace
 
 import lots
 import numpy as np
 import pytest
 from each import each
 
-from inertial import frames, operators, poses
+from inertial import frames, operators
+from inertial.change_of_level import several_levels
 from inertial.correction import correct, remaining_step
 from inertial.state import State
 from inertial.static_intervals import find
@@ -19,20 +22,6 @@ def test_forces_are_products_of_right_handed_rotations_and_angles_turn_gravity_b
     np.testing.assert_allclose(frames.rotation_z(np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
     wanted = directions(rng, 50)
     np.testing.assert_allclose(frames.force_from_angles(*frames.angles_from_force(wanted)), wanted, atol=1e-12)
-
-
-@each(["six", "nine", "twelve", "eighteen", "twenty_six", "fibonacci24", "orthogonal24"])
-def test_named_plans_have_their_poses_on_the_sphere(name):
-    angles = np.radians(poses.plan(name))
-    counts = {"six": 6, "nine": 9, "twelve": 12, "eighteen": 18, "twenty_six": 26}
-    assert angles.shape == (counts.get(name, 24), 2)
-    force = frames.force_from_angles(angles[:, 0], angles[:, 1])
-    np.testing.assert_allclose(np.linalg.norm(force, axis=1), 1.0, atol=1e-12)
-    if name != "nine":  # six faces and three edges lean to one side by design
-        np.testing.assert_allclose(force.mean(axis=0), 0.0, atol=2e-3)
-    if name == "orthogonal24":  # every face is up four times
-        _, times = np.unique(np.round(force) + 0.0, axis=0, return_counts=True)
-        assert times.tolist() == [4] * 6
 
 
 def point_by_point(signal: np.ndarray, half_width: float, start: float) -> np.ndarray:
@@ -68,21 +57,16 @@ EFFECTS = ["bias", "scale", "third_order"]
 COEFFICIENTS = np.tile([0.01, 1.0, 1e-3], (3, 1))  # each axis, in g
 
 
-def solved(output: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The corrected output, and the further step that is left in each row."""
-    nothing = State(np.zeros(output.shape), np.zeros(len(output)))
-    corrected = correct(EFFECTS, nothing, output, COEFFICIENTS, {})
-    step = remaining_step(EFFECTS, State(corrected, np.zeros(len(output))), output, COEFFICIENTS, {}, corrected)
-    return corrected, np.abs(step).max(axis=1)
-
-
 def test_a_force_in_range_is_solved_and_an_output_far_outside_leaves_a_step(rng: np.random.Generator) -> None:
     force = rng.uniform(-1.0, 1.0, (50, 3))
     output = 0.01 + force + 1e-3 * force**3
     output[49] = [900.0, 0.0, 0.0]
+    nothing = State(np.zeros((50, 3)), np.zeros(50))
     with np.errstate(all="ignore"):
-        corrected, step = solved(output)
+        corrected = correct(EFFECTS, nothing, output, COEFFICIENTS, {})
+        left = remaining_step(EFFECTS, replace(nothing, force=corrected), output, COEFFICIENTS, {}, corrected)
     np.testing.assert_allclose(corrected[:49], force[:49], atol=1e-9)
+    step = np.abs(left).max(axis=1)
     assert np.all(step[:49] < 1e-9)
     assert not step[49] < 1e-6
 
@@ -109,3 +93,10 @@ def test_static_intervals_are_those_that_were_made_and_a_record_that_never_moves
             assert start + length - 60 < b <= start + length
     intervals = find(rng.normal(size=(5000, 3)), 100.0)
     assert (intervals.start.tolist(), intervals.stop.tolist()) == ([0], [5000])
+
+
+def test_pieces_near_the_shortest_are_a_motion_and_longer_ones_are_positions(rng: np.random.Generator) -> None:
+    steps = rng.normal(size=(40, 3))
+    for samples, positions in ((6, 1), (25, 40)):
+        record = np.repeat(steps, samples, axis=0) + 0.001 * rng.normal(size=(40 * samples, 3))
+        assert several_levels(record) == positions

@@ -21,7 +21,7 @@ def plan(name: str = "fibonacci24") -> np.ndarray:
 
 
 def force_of(angles: np.ndarray) -> np.ndarray:
-    return force_from_angles(angles[:, 0], angles[:, 1])
+    return force_from_angles(*angles.T)
 
 
 def test_units_with_errors_of_their_own_and_too_few_dwells_accuse_nobody(rng: np.random.Generator) -> None:
@@ -52,9 +52,8 @@ def test_the_angle_is_that_of_the_table(rng: np.random.Generator) -> None:
 
 
 def test_a_soak_is_judged_by_its_own_dwells(rng: np.random.Generator) -> None:
-    angles = np.degrees(plan("nine"))
-    watched = Pointing()
-    force = force_from_angles(*np.radians(angles).T)
+    angles, watched = poses.plan("nine"), Pointing()
+    force = force_of(plan("nine"))
     for soak in (0, 1):  # what the units do at another temperature is their own matter
         output = lot(np.random.default_rng(soak), force)
         for dwell, pose in enumerate(angles):

@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
-import pandas as pd
 import pytest
+from each import each
 from inquiries import job_of
 from long_suites import mostly_slow
-from lots import dwell_rows
 
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import diagnose
@@ -23,7 +23,6 @@ from inertial.power import coldness, switched
 from inertial.state import History, State
 from pipelines.inquiry.explanation import what
 from pipelines.inquiry.followup import circumstances, follow_up, state_after, station_minutes
-from pipelines.tables.dwells import lot_arrays, measured
 
 UP, DOWN = (0.0, 0.0), (math.pi, 0.0)
 
@@ -42,20 +41,14 @@ def run_of(count: int = 40, units: int = 3, *, powered: float = 900.0) -> State:
 
 
 def switched_off(state: State, off: float, count: int = 30) -> State:
-    """The same with the devices off for ``off`` s, and two opposed poses in turn afterwards."""
     first = SequenceStep(*UP, 25.0, off=off)
     return extended(state, [first, *(SequenceStep(*(DOWN, UP)[k % 2], 25.0) for k in range(count - 1))])
 
 
 # how cold a device was when it was switched on again depends on all cycles before, in their order: no warm-up after a cycle
-@pytest.mark.parametrize(
-    ("name", "powered", "off"),
-    [
-        ("warm_up", True, None), ("warm_up", False, None),
-        ("aging_log", True, None), ("aging_log", False, None), ("aging_log", True, 300.0),
-    ],
-)  # fmt: skip
-def test_time_is_counted_from_the_first_dwell_in_whatever_order_dwells_are_given(name, powered, off):
+@each([*product(("warm_up", "aging_log"), (True, False), (None,)), ("aging_log", True, 300.0)])
+def test_time_is_counted_from_the_first_dwell_in_whatever_order_dwells_are_given(row):
+    name, powered, off = row
     # it had been counted from the dwell given first: below zero for all others, where a logarithm has no value
     state = run_of() if off is None else switched_off(run_of(), off)
     state = replace(state, time=state.time + 40.0 * np.arange(3)[:, None])
@@ -113,7 +106,6 @@ def test_steps_after_a_history_begin_when_it_ends_where_the_station_still_stands
 
 
 def diagnosed(state: State, bias: np.ndarray, rng: np.random.Generator):
-    """The diagnosis of ideal devices but for a bias by dwell, with a microgram of noise."""
     shape = (*state.time.shape, 3)
     output = state.force + bias[..., None] + 1e-6 * rng.standard_normal(shape)
     lot = Lot(state, output, np.full(shape, 1e-6), np.broadcast_to(np.eye(3), (shape[0], 3, 3)))
@@ -172,24 +164,3 @@ def test_a_power_order_reaches_the_recipe_the_minutes_and_the_words(tmp_path):
     both = ("warm_up", "aging_log")
     told = Proposal(1.0, 50.0, both, kinds=("power",), steps=tuple(wanted), pair=both, minutes=10.0, settled=1.0)
     assert what(run_of(), told) == "Switching the units off for 10 min: warm_up restarts, aging_log continues"
-
-
-def dwells_of(state: State, noise: float, rng: np.random.Generator) -> pd.DataFrame:
-    output = state.force + noise * rng.standard_normal(state.force.shape)
-    rows = zip("ABC", state.time, state.force, output, state.since_power, strict=False)
-    units = [dwell_rows(unit, time, f, out, 1e-5, since_power_s=since, slot=0) for unit, time, f, out, since in rows]
-    return pd.concat(units, ignore_index=True)
-
-
-def test_warm_up_after_a_power_off_is_the_same_for_a_fit_as_for_a_diagnosis(rng):
-    """Off for 600 s: the columns of both, against a body that warms and cools step by step."""
-    run, tau, off = switched_off(run_of(units=1), 600.0), 900.0, 600.0
-    table = dwells_of(run, 0.0, rng).assign(power_off_s=run.power_off[0])
-    warm_up = catalogue.get("warm_up")
-    by_fit, other = (warm_up.columns(one.state, 0, tau=tau)[0, :, 0] for one in (lot_arrays(table), measured(table)))
-    np.testing.assert_array_equal(by_fit, other)
-    # on since 1680 s when it goes off: e^(-1680/900) is lacking then, and all but the rest of its warmth is gone after 600 s
-    on = float(run.time[0, 40] - run.since_power[0, 40] - off - (run.time[0, 0] - run.since_power[0, 0]))
-    lacking = 1.0 - (1.0 - math.exp(-on / tau)) * math.exp(-off / tau)
-    assert by_fit[40] / math.exp(-run.since_power[0, 40] / tau) == pytest.approx(lacking, rel=1e-9)
-    assert 0.4 < lacking < 0.6

@@ -1,4 +1,4 @@
-"""The climate unit of the simulated station: legs, what it has reached, and what stops it."""
+"""Test equipment of the simulated station: the climate unit's legs, and a supply whose ripple and voltage do not stay."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from small_station import lot_of
 
 from schemas.errors import OperatorNeeded, StationRefused
@@ -50,27 +51,37 @@ def test_a_shock_changes_the_air_within_minutes() -> None:
         assert air[round(180.0 / 10.0)] < -39.0
 
 
-def test_what_was_not_reached_is_told_and_not_repeated() -> None:
-    with (
-        opened() as station,
-        pytest.raises(OperatorNeeded, match=r"humidity at .* at the end of the leg, 95 ± 5 % was ordered"),
-    ):
-        station.equipment["climate"].expose(25.0, 95.0, ROOM_HPA, 1.0, 30.0, [0])
+STOPPED = [
+    ((), (25.0, 95.0, 30.0), OperatorNeeded, r"humidity at .* at the end of the leg, 95 ± 5 % was ordered"),
+    ((), (200.0, None, 60.0), StationRefused, r"temperature 200\.0; -75\.0 to 180.0"),
+    (("controller_abort",), (40.0, None, 60.0), OperatorNeeded, "door of the climate unit open"),
+    (("missed_trigger",), (40.0, None, 60.0), RecordingSpoilt, "trigger was missed"),  # it is taken again
+]
 
 
-def test_orders_beyond_the_unit_are_refused() -> None:
-    with opened() as station, pytest.raises(StationRefused, match=r"temperature 200\.0; -75\.0 to 180.0"):
-        station.equipment["climate"].expose(200.0, None, ROOM_HPA, 60.0, 60.0, [0])
+@each(STOPPED)
+def test_what_stops_a_leg_is_told(row) -> None:
+    faults, (celsius, humidity, seconds), error, told = row
+    with opened(*(FaultOrder(kind=kind, at_s=0.0) for kind in faults)) as station, pytest.raises(error, match=told):
+        station.equipment["climate"].expose(celsius, humidity, ROOM_HPA, 1.0, seconds, [0])
 
 
-def test_an_abort_needs_the_operator_and_a_missed_trigger_is_taken_again() -> None:
-    with (
-        opened(FaultOrder(kind="controller_abort", at_s=0.0)) as station,
-        pytest.raises(OperatorNeeded, match="door of the climate unit open"),
-    ):
-        station.equipment["climate"].expose(40.0, None, ROOM_HPA, 60.0, 60.0, [0])
-    with (
-        opened(FaultOrder(kind="missed_trigger", at_s=0.0)) as station,
-        pytest.raises(RecordingSpoilt, match="trigger was missed"),
-    ):
-        station.equipment["climate"].expose(40.0, None, ROOM_HPA, 60.0, 60.0, [0])
+def test_a_ripple_is_on_the_nominal_voltage_and_a_voltage_has_no_ripple() -> None:
+    with open_station(load_station(), lot_of(1, "SF1500"), roles=["power_supply"]) as station:
+        supply: Any = station.equipment["power_supply"]
+
+        def state() -> tuple[float, float]:
+            return supply.values.number("voltage"), supply.values.number("ripple")
+
+        supply.set_voltage(13.0)
+        supply.set_ripple(0.1, 100.0)
+        assert state() == (12.0, 0.1)
+        supply.set_ripple(0.2, 1000.0)
+        assert state() == (12.0, 0.2)
+        supply.set_voltage(11.0)
+        assert state() == (11.0, 0.0)
+        supply.set_ripple(0.1, 100.0)
+        supply.stand_by()
+        assert state() == (12.0, 0.0)
+        with pytest.raises(StationRefused, match="correct ripple_V of the recipe"):
+            supply.set_ripple(4.0, 100.0)

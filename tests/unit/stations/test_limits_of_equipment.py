@@ -31,13 +31,11 @@ def station_of(role: str, profile: str, faults: list[FaultOrder] | None = None, 
 
 @contextmanager
 def opened(role: str, profile: str, **maximum: float) -> Iterator[Any]:
-    """The equipment of a role at a station that has nothing else."""
     with open_station(station_of(role, profile, **maximum), lot_of(1), roles=[role]) as station:
         yield station.equipment[role]
 
 
 def drives(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The amplitudes in V of all bursts of the simulated generator."""
     amplitudes: list[float] = []
     begin = Generator._begin
 
@@ -84,11 +82,7 @@ def test_the_drive_rises_tenfold_at_most_and_not_beyond_the_station_file(monkeyp
 @pytest.mark.parametrize("profile", ["vibration_controller", "scpi_exciter"])
 def test_motion_beyond_the_exciter_is_refused_before_it_moves_and_the_station_file_narrows_it(profile):
     with opened("exciter", profile) as exciter:
-        for frequency, level, text in (
-            (8.0, 5.0, "displacement"),
-            (30.0, 31.0, "velocity"),
-            (500.0, 51.0, "acceleration"),
-        ):
+        for frequency, level, text in ((8, 5, "displacement"), (30, 31, "velocity"), (500, 51, "acceleration")):
             with pytest.raises(OperatorNeeded, match=rf"peak {text} .* at most .* is allowed"):
                 exciter.sine(frequency, level, 2, 0.1, [0])
     if profile != "vibration_controller":

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from each import each
+from long_suites import mostly_slow
 from made_worlds import BASE, World, lot_in, make
 
 from benchmarks.large_lots import MODEL, many_units
@@ -51,24 +52,18 @@ def test_an_axis_that_rests_in_one_pose_has_its_bias_over_temperature_named(alon
     assert [{"bias_temperature_quadratic"} <= set(named.effects.ids) for named in found.named] == [True]
 
 
-@pytest.mark.parametrize(
-    ("common", "name"),
-    [
-        ("quadratic", "bias_temperature_quadratic"),
-        pytest.param("cubic", "third_order", marks=pytest.mark.slow),
-        pytest.param("warm-up", "warm_up", marks=pytest.mark.slow),
-    ],
-)
-def test_an_effect_that_many_units_have_alike_is_named_though_each_of_them_hardly_shows_it(
-    common: str, name: str
-) -> None:
+ALIKE = {"quadratic": "bias_temperature_quadratic", "cubic": "third_order", "warm-up": "warm_up"}
+
+
+@pytest.mark.parametrize("common", mostly_slow(ALIKE, "quadratic"))
+def test_an_effect_that_many_units_have_alike_is_named_though_each_of_them_hardly_shows_it(common: str) -> None:
     """Charged for a coefficient of every unit and axis, they lost to a drift of the reference and to curves over the time."""
     found = diagnose(many_units(80, 41, common, 0.9), MODEL, np.random.default_rng(2))
-    assert (found.adequate, [name in named.effects.ids for named in found.named]) == (False, [True])
+    assert (found.adequate, [ALIKE[common] in named.effects.ids for named in found.named]) == (False, [True])
     assert (found.handled, found.unexplained) == ((), None)
 
 
-@pytest.mark.parametrize("seed", [8304, pytest.param(8301, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", mostly_slow([8304, 8301], 8304))
 def test_what_a_sample_of_a_large_lot_takes_for_a_handling_error_is_judged_in_the_complete_lot(seed: int) -> None:
     """In two dozen of these units a step of the reference explains as much as the cubic; of 8301, at another φ of its own."""
     found = diagnose(many_units(100, seed, "cubic", 0.5), MODEL, np.random.default_rng(2))
@@ -81,15 +76,17 @@ def test_rivals_are_compared_at_the_wander_of_the_one_that_stays_best() -> None:
     assert [named.effects.ids[0] for named in found.named] == ["bias_temperature_quadratic"]
 
 
-@pytest.mark.parametrize("common", ["poses", pytest.param("", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("common", mostly_slow(["poses", ""], "poses"))
 def test_noise_and_poses_that_differ_alike_for_all_of_many_units_are_no_effect(common: str) -> None:
     found = diagnose(many_units(80, 43, common, 1.5), MODEL, np.random.default_rng(2))
     assert (found.adequate, found.named, found.handled) == (True, (), ())
 
 
-@each(["", "radians", "one row too late", "order of rows"])
+@each(["", "radians", "one row too late", "order of rows", "the outputs do not follow the recorded poses"])
 def test_poses_that_contradict_the_outputs_are_told_and_nothing_else(wrong: str) -> None:
     dwells = make(World(units=3), 5).dwells.drop(columns=["force_x", "force_y", "force_z"], errors="ignore")
+    if "outputs" in wrong:  # it had been left to a probability
+        dwells[["out_x", "out_y", "out_z"]] = np.random.default_rng(4).normal(0.0, 0.3, (len(dwells), 3))
     angles, order = ["outer_deg", "inner_deg"], np.random.default_rng(1).permutation(72)
     for _, rows in dwells.groupby("unit"):
         table = rows[angles].to_numpy()
@@ -98,15 +95,6 @@ def test_poses_that_contradict_the_outputs_are_told_and_nothing_else(wrong: str)
     found = diagnosed(dwells)
     assert (found["adequate"], found["classes"], found["unexplained"]) == (not wrong, [], None)
     assert wrong in (found["reason"] or "")
-
-
-def test_outputs_that_follow_no_pose_are_told_and_not_left_to_a_probability() -> None:
-    dwells, rng = make(World(units=3), 6).dwells, np.random.default_rng(4)
-    columns = [f"out_{axis}" for axis in "xyz"]
-    dwells[columns] = rng.normal(0.0, 0.3, (len(dwells), 3))
-    found = diagnosed(dwells)
-    assert (found["adequate"], found["classes"], found["unexplained"]) == (False, [], None)
-    assert "the outputs do not follow the recorded poses" in (found["reason"] or "")
 
 
 def test_a_saw_tooth_of_every_unit_is_a_course_over_time_and_no_change_of_single_units() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from long_suites import mostly_slow
 
-from inertial.discovery.driver_sums import LotStack, gathered
+from inertial.discovery.driver_sums import LotStack
 from inertial.discovery.evidence import MEAN, ScoredLot
 from inertial.discovery.naming import Name, Pool
 from inertial.discovery.scores import Products
@@ -108,11 +108,3 @@ def test_noise_that_a_unit_estimates_beside_the_effect_takes_nothing_of_it() -> 
     at = [int(label[1:]) for label in name.labels]
     true = sizes[at] - np.average(sizes[at], axis=0, weights=name.weights)
     assert np.sum(name.sizes * true) / np.sum(true**2) == pytest.approx(1.0, abs=0.02)
-
-
-def test_the_evidence_of_an_effect_without_levels_is_that_of_its_lots() -> None:
-    lots = Drawn().lots(np.random.default_rng(3), np.full((1, AXES), 0.5), np.zeros((90, UNITS), dtype=int))
-    name = named(lots, MEAN)
-    assert name.sizes[0] == pytest.approx([0.5] * AXES, abs=4.0 / np.sqrt(90 * UNITS))
-    assert name.errors[0] == pytest.approx([1.0 / np.sqrt(90 * UNITS)] * AXES, rel=0.5)
-    assert gathered(LotStack.of(lots), [MEAN])[MEAN].labels == list(name.labels)

@@ -49,35 +49,13 @@ def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) 
     assert effect in name.effects
     assert len(name.effects) <= 4
     assert name.drivers[0] == driver
-    if (
-        driver in {"slot", "radius"} and effect != "creep_after_move"
-    ):  # of unit rms over the levels; its time constant is unknown
+    # of unit rms over the levels; the time constant of a creep is unknown
+    if driver in {"slot", "radius"} and effect != "creep_after_move":
         assert name.size()[0] == pytest.approx(0.3 * FLOOR_UG * 1e-6, rel=0.06)
     factor, error, able = pool().confirmed(result.lots[:20], result.lots[20:], driver, effect)
     assert able == 20
     assert factor == pytest.approx(1.0, abs=max(5.0 * error, 0.2))
     assert float(np.mean(pool().carried(result.lots, driver, effect) > 0.0)) > 0.6
-
-
-def test_the_size_of_an_effect_does_not_depend_on_the_order_of_its_columns() -> None:
-    result, products = archive("cross_coupling", "slot"), maker().products
-    k = len(products.columns)
-    at = pool().places("cross_coupling")
-    order = np.arange(k)
-    order[at] = at[::-1]
-    h = (k * np.arange(3)[:, None] + order).reshape(-1)
-    swapped = replace(
-        products,
-        lot=products.lot[np.ix_(h, h)],
-        inside=products.inside[:, order[:, None], order],
-        size=products.size[h],
-    )
-    lots = [
-        replace(lot, score=lot.score[:, h], own=lot.own[:, h], information=lot.information[h]) for lot in result.lots
-    ]
-    (before,), _ = pool().names(result.lots, result.alarms, NEEDED)
-    (after,), _ = Pool(swapped).names(lots, result.alarms, NEEDED)
-    assert after.size() == pytest.approx(before.size(), rel=1e-6)
 
 
 def test_what_had_no_alarm_is_not_named() -> None:

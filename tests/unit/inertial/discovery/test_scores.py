@@ -42,9 +42,8 @@ def test_score_over_information_is_the_coefficient_of_a_fit(name: str) -> None:
     assert scores.score**2 / scores.own == pytest.approx(fall, rel=1e-8)
     # a second way: generalised least squares with the covariance written out
     space, block = model.space, 4
-    white = space.covariance.whiten(
-        np.concatenate([problem.y[..., None], model.local, problem.columns(effect, {})], axis=-1), model.noise.shares
-    )
+    series = np.concatenate([problem.y[..., None], model.local, problem.columns(effect, {})], axis=-1)
+    white = space.covariance.whiten(series, model.noise.shares)
     fitted = np.linalg.lstsq(white[block][:, 1:], white[block][:, 0], rcond=None)[0][-1]
     unit, axis = divmod(block, 3)
     assert scores.score[unit, axis] / scores.own[unit, axis] == pytest.approx(fitted, rel=1e-6)
@@ -70,9 +69,8 @@ def test_an_error_of_the_table_leaves_the_scores_beside_free_errors_of_the_stati
 def _moved(before: LotScores, after: LotScores) -> float:
     """Largest change of a lot's sums, in standard deviations."""
     sigma = np.sqrt(before.information)
-    return float(
-        (np.abs(after.score.sum(axis=0) - before.score.sum(axis=0)) / np.where(sigma > 0.0, sigma, np.inf)).max()
-    )
+    moved = np.abs(after.score.sum(axis=0) - before.score.sum(axis=0))
+    return float((moved / np.where(sigma > 0.0, sigma, np.inf)).max())
 
 
 def test_a_hardening_spring_is_a_cubic_of_all_units_and_falls_behind() -> None:
@@ -110,12 +108,9 @@ def test_the_temperature_coefficient_of_a_bias_is_that_of_the_fit() -> None:
     force = np.broadcast_to(lot.state.force, lot.output.shape)
     columns = np.stack([np.ones_like(warm[:, 0]), *np.moveaxis(force, -1, 0), warm[:, 0]], axis=-1)
     scores = scores_of(lot, EFFECTS, [catalogue.get("third_order")])
-    for unit in range(8):
-        for axis in range(3):
-            design = np.column_stack([columns[unit], warm[unit, 0] * columns[unit, :, 1 + axis]])
-            plain = np.linalg.lstsq(design, out[unit, axis], rcond=None)[0][4]
-            assert scores.tempco[unit, axis] == pytest.approx(
-                plain, abs=1.5e-6
-            )  # 12 µg of wander over 70 K, of 40 µg/K
+    for unit, axis in np.ndindex(8, 3):
+        design = np.column_stack([columns[unit], warm[unit, 0] * columns[unit, :, 1 + axis]])
+        plain = np.linalg.lstsq(design, out[unit, axis], rcond=None)[0][4]
+        assert scores.tempco[unit, axis] == pytest.approx(plain, abs=1.5e-6)  # 12 µg of wander over 70 K, of 40 µg/K
     without = scores_of(lot, ["bias", "scale", "misalignment"], [catalogue.get("third_order")])
     assert np.isnan(without.tempco).all()

@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 from spun_centrifuge import RADIUS_ERROR, spins, spun
 
-from inertial.dynamics.centrifuge import (
-    TERMS,
-    Polynomial,
-    fit_polynomial,
-    fit_radii,
-    linearity_error,
-    linearity_percent,
-)
+from inertial.dynamics import centrifuge
+from inertial.dynamics.centrifuge import TERMS, fit_radii, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_effects import Spins
 from inertial.errors import NotIdentified
 
@@ -40,23 +34,23 @@ def pulls(signs: tuple[float, ...], count: int) -> dict[str, np.ndarray]:
     return {name: np.array(values) for name, values in by_name.items()}
 
 
-def fitted(points: Spins, seed: int):
-    out, error, _ = spun(points, TRUE, np.random.default_rng(seed))
-    return fit_radii(points.acceleration, points.radius_m, out, error, RADIUS_ERROR)
+def fitted(points: Spins, seed: int, true: dict[str, float] = TRUE):
+    """The outputs of a run and its fit."""
+    out, error, _ = spun(points, true, np.random.default_rng(seed))
+    return out, fit_radii(points.acceleration, points.radius_m, out, error, RADIUS_ERROR)
 
 
 def test_the_scale_by_two_radii_in_one_mounting_has_the_closed_uncertainty_of_their_distance() -> None:
-    one_way = fitted(spins(signs=(1.0,)), 1).unit.of("scale")[1]
+    one_way = fitted(spins(signs=(1.0,)), 1)[1].unit.of("scale")[1]
     assert one_way == pytest.approx(np.sqrt(2.0) * RADIUS_ERROR / 0.2, rel=0.02)  # slopes are known far better
-    both = fitted(spins(), 1).unit.of("scale")[1]
+    both = fitted(spins(), 1)[1].unit.of("scale")[1]
     assert both == pytest.approx(1.0 / np.hypot(0.5 / RADIUS_ERROR, 0.3 / RADIUS_ERROR), rel=0.02)
 
 
 def test_the_linearity_is_that_of_the_unit_without_arm_and_offset() -> None:
     straight = {"second_order": 0.0, "third_order": 0.0, "mass_offset": 2e-4, "arm_stretch": 2e-8}
     points = spins()
-    out, error, _ = spun(points, straight, np.random.default_rng(2))
-    fit = fit_radii(points.acceleration, points.radius_m, out, error, RADIUS_ERROR)
+    out, fit = fitted(points, 2, straight)
     assert linearity_percent(fit.unit, 30.0) < 1e-3
     line = np.polyfit(points.acceleration, out, 1)
     assert 100.0 * np.max(np.abs(out - np.polyval(line, points.acceleration))) / 30.0 > 5e-3
@@ -65,7 +59,7 @@ def test_the_linearity_is_that_of_the_unit_without_arm_and_offset() -> None:
 def test_one_radius_or_radii_that_are_close_leave_the_offset_open() -> None:
     with pytest.raises(NotIdentified, match="another radius"):
         fitted(spins((0.5,)), 3)
-    wide, narrow = (fitted(spins(radii), 4).mass_offset_m[1] for radii in ((0.5, 0.3), (0.5, 0.49)))
+    wide, narrow = (fitted(spins(radii), 4)[1].mass_offset_m[1] for radii in ((0.5, 0.3), (0.5, 0.49)))
     assert narrow > 20.0 * wide
 
 
@@ -83,9 +77,11 @@ def test_the_uncertainty_of_the_linearity_holds_the_covariance(rng: np.random.Ge
     force = np.concatenate([steps, -steps])
     error = np.full(force.size, 1e-4)
     curve = force + 2e-6 * force**2 + 1e-7 * force**3
-    fits = [fit_polynomial(force, curve + error * rng.normal(size=force.size), error, TERMS) for _ in range(120)]
+    fits = [
+        centrifuge.fit_polynomial(force, curve + error * rng.normal(size=force.size), error, TERMS) for _ in range(120)
+    ]
     spread = np.std([linearity_percent(one, 30.0) for one in fits], ddof=1)
     assert np.mean([linearity_error(one, 30.0) for one in fits]) == pytest.approx(spread, rel=0.2)
     one = fits[0]
-    apart = Polynomial(one.names, one.value, np.diag(np.diag(one.covariance)), one.residuals, 0.0, 0)
+    apart = centrifuge.Polynomial(one.names, one.value, np.diag(np.diag(one.covariance)), one.residuals, 0.0, 0)
     assert linearity_error(apart, 30.0) > 2.0 * spread

@@ -5,8 +5,7 @@ import pytest
 from long_suites import mostly_slow
 from scipy import signal
 
-from inertial.dynamics.shock_diagnosis import Design, ShockRecord, Waves, diagnose_shock
-from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
+from inertial.dynamics.shock_diagnosis import ShockRecord, Waves, diagnose_shock
 
 FINE = 200e3
 DURATION, RATE, BEFORE, AFTER = 0.011, 40 / 0.011, 0.015, 0.08
@@ -65,25 +64,11 @@ def test_a_hidden_effect_of_a_shock_is_named_and_samples_left_out_are_predicted_
 
 @pytest.mark.slow
 def test_shocks_in_one_direction_do_not_tell_an_ac_coupled_reference_from_a_zero_shift(rng) -> None:
-    one = diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng, signs=(1.0,)))
-    both = diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng))
+    one, both = (diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng, signs)) for signs in ((1.0,), (1.0, -1.0)))
     assert {"ac_coupled_reference", "zero_shift"} <= set(one.classes[0].effects)
     assert any("other direction" in text for text in one.next_steps)
-    assert "ac_coupled_reference" in both.classes[0].effects
-    assert "zero_shift" not in both.classes[0].effects
+    assert {"ac_coupled_reference", "zero_shift"} & set(both.classes[0].effects) == {"ac_coupled_reference"}
     assert both.extended.parameters["coupling_s"][0] == pytest.approx(2.0, rel=0.1)
-
-
-def test_a_design_that_keeps_waveforms_is_that_of_a_new_one(rng) -> None:
-    record, effects = shock_of("filter_of_unit", 350.0, rng), ("delay", "filter_of_unit", "filter_of_reference")
-    parameters = [(name, p) for name in effects for p in SHOCK_EFFECTS[name].parameters(record.duration_s)]
-    kept = Design(record, effects, parameters)
-    start = np.array([1e-4, np.log(300.0), np.log(900.0)])
-    for k in (0, 1, 2, 1, 0, 2):  # one parameter after the other, and back
-        x = start.copy()
-        x[k] += 0.01
-        np.testing.assert_array_equal(kept.at(x), Design(record, effects, parameters).at(x))
-        np.testing.assert_array_equal(kept.at(start), Design(record, effects, parameters).at(start))
 
 
 def test_nothing_is_named_in_shocks_without_a_hidden_effect(rng) -> None:

@@ -1,5 +1,6 @@
 """Intervals of the stability of an hour, and flicker that is known from a short record only."""
 
+import independent_noise as made
 import numpy as np
 import pytest
 from long_suites import mostly_slow
@@ -41,17 +42,11 @@ SECONDS, RUNS = 3600, 100
 def hours(rng: np.random.Generator, white: float, flicker: float) -> tuple[np.ndarray, np.ndarray]:
     """Means of 1 s over an hour (RUNS, 3600) of white noise and of 1/f noise of density ``flicker``²/f, and its densities.
 
-    The 1/f noise ends at a period of sixteen hours, of which an hour is cut out.
+    The 1/f noise ends at a period of 2¹⁶ s, eighteen hours, of which an hour is cut out.
     """
-    long = 16 * SECONDS
-    f = np.arange(1, long // 2 + 1) / long
-    density = flicker**2 / f
-    records = np.empty((RUNS, SECONDS))
-    for k in range(RUNS):
-        z = rng.normal(size=(2, f.size))
-        spectrum = np.concatenate([[0.0], (z[0] + 1j * z[1]) * np.sqrt(density * long / 4.0)])
-        records[k] = np.fft.irfft(spectrum, long)[:SECONDS] + white * rng.normal(size=SECONDS)
-    return records, density
+    f = np.arange(1, 2**15 + 1) / 2**16
+    slow = np.stack([made.flicker(rng, 1, SECONDS, flicker * np.sqrt(np.pi), longer=16)[0] for _ in range(RUNS)])
+    return slow + white * rng.normal(size=slow.shape), flicker**2 / f
 
 
 def expected(white: float, density: np.ndarray, walk: float) -> tuple[float, float]:
@@ -66,13 +61,10 @@ def expected(white: float, density: np.ndarray, walk: float) -> tuple[float, flo
     return float(np.sqrt(36.0 / 35.0 * spread)), float(np.sqrt(allan))
 
 
-@pytest.mark.parametrize(
-    ("white", "flicker", "walk"),
-    mostly_slow(
-        [(10.0, 0.0, 0.0), (10.0, 5.0, 0.0), (3.0, 50.0, 0.0), (10.0, 5.0, 1.0), (10.0, 0.0, 5.0)],
-        *[(10.0, 5.0, 1.0)],
-    ),
-)
+NOISES = [(10.0, 0.0, 0.0), (10.0, 5.0, 0.0), (3.0, 50.0, 0.0), (10.0, 5.0, 1.0), (10.0, 0.0, 5.0)]
+
+
+@pytest.mark.parametrize(("white", "flicker", "walk"), mostly_slow(NOISES, (10.0, 5.0, 1.0)))
 @pytest.mark.parametrize("shown", ["by the hour alone", "by a static record"])
 def test_the_intervals_of_an_hour_hold_the_process(white, flicker, walk, shown, rng):
     records, density = hours(rng, white, flicker)
@@ -160,11 +152,8 @@ def test_the_difference_of_two_short_windows_is_held_by_its_uncertainty(rng: np.
     pulls, sizes = [], []
     for own in record:
         noise = [short_noise(part, 1.0) for part in (own[:40], own[200:])]
-        pooled = ShortNoise(
-            float(np.mean([one.white for one in noise])),
-            float(np.mean([one.flicker for one in noise])),
-            float(np.hypot(noise[0].flicker_error, noise[1].flicker_error) / 2.0),
-        )
+        white, slow = (float(np.mean([getattr(one, name) for one in noise])) for name in ("white", "flicker"))
+        pooled = ShortNoise(white, slow, float(np.hypot(*(one.flicker_error for one in noise)) / 2.0))
         sizes.append(pooled.flicker / OCTAVE)
         pulls.append((own[200:].mean() - own[:40].mean()) / difference_error(pooled, 40.0, 200.0))
     assert np.mean(sizes) == pytest.approx(1.0, abs=2.6 * np.std(sizes) / np.sqrt(runs))

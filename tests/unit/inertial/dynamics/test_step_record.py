@@ -73,13 +73,9 @@ def test_the_pulls_of_the_figures_have_unit_variance() -> None:
         out = clean + noise * generator.normal(size=len(time))
         figures = step_figures(time, out, np.full(len(time), noise), band=0.02)
         known += figures.settling_identified
-        pulls.append(
-            (
-                (figures.overshoot - true.overshoot) / figures.overshoot_error,
-                (figures.settling_s - true.settling_s) / figures.settling_error_s,
-                (figures.rise_s - true.rise_s) / figures.rise_error_s,
-            )
-        )
+        stated = (figures.overshoot_error, figures.settling_error_s, figures.rise_error_s)
+        away = [getattr(figures, n) - getattr(true, n) for n in ("overshoot", "settling_s", "rise_s")]
+        pulls.append(np.divide(away, stated))
     assert known >= 190
     assert np.all(np.abs(np.std(pulls, axis=0, ddof=1) - 1.0) < 0.15)
     assert np.all(np.abs(np.mean(pulls, axis=0)) < 0.35)
@@ -94,21 +90,20 @@ def test_an_extremum_at_the_edge_of_the_band_is_said_and_no_settling_time_is_sta
 
 def test_records_without_a_step_or_too_noisy_or_too_short_are_refused() -> None:
     time, out = recorded(0.7)
-    with pytest.raises(NotIdentified, match="does not rise"):
-        step_figures(time, 0.0 * out, np.full(len(time), 1e-4), band=0.02)
-    with pytest.raises(NotIdentified, match="average more steps"):
-        step_figures(time, out, np.full(len(time), 0.02), band=0.02)
-    short = time < 3e-4
-    with pytest.raises(NotIdentified, match="record longer"):
-        step_figures(time[short], out[short], np.full(short.sum(), 1e-4), band=0.001)
+    whole, short = np.isfinite(time), time < 3e-4
+    for words, part, scale, noise, band in (
+        ("does not rise", whole, 0.0, 1e-4, 0.02),
+        ("average more steps", whole, 1.0, 0.02, 0.02),
+        ("record longer", short, 1.0, 1e-4, 0.001),
+    ):
+        with pytest.raises(NotIdentified, match=words):
+            step_figures(time[part], scale * out[part], np.full(part.sum(), noise), band=band)
 
 
 def test_alignment_removes_the_blur_of_a_sampled_edge(rng: np.random.Generator) -> None:
-    times, outs, late = [], [], rng.uniform(-1.0, 1.0, 16) * 10e-6
-    for one in late:
-        time = np.arange(-100, 900) / 50e3
-        outs.append(step_response(time + one, 2000.0, 0.7))
-        times.append(time)
+    late = rng.uniform(-1.0, 1.0, 16) * 10e-6
+    times = [np.arange(-100, 900) / 50e3] * 16
+    outs = [step_response(time + one, 2000.0, 0.7) for time, one in zip(times, late, strict=True)]
     joined = np.concatenate(aligned(times, outs))
     order = np.argsort(joined)
     true = step_response(joined[order] + late.mean(), 2000.0, 0.7)

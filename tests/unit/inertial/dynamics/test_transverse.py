@@ -1,4 +1,4 @@
-"""Departures over the supply and over the angle: closed forms, pulls, limits, phases and distortion."""
+"""Supply and angle: departures, transverse sensitivity, phases, and the line of a ripple with its rejection."""
 
 from typing import Any
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from inertial.dynamics.ratiometry import departures, largest_departure, slope_over, zero_and_sensitivity
+from inertial.dynamics.supply_ripple import Line, rejection_db, ripple_line
 from inertial.dynamics.transverse import fit_transverse, relative_phase
 from inertial.errors import NotIdentified
 
@@ -36,14 +37,9 @@ def test_pulls_over_the_supply_and_over_the_angle(rng: np.random.Generator) -> N
         output = size * np.cos(angle - turn) + 0.01 * rng.normal() + 5e-5 * rng.normal(size=angle.size)
         across = fit_transverse(np.cos(angle), np.sin(angle), output, np.full(angle.size, 5e-5))
         away = (across.direction_deg - np.degrees(turn) + 180.0) % 360.0 - 180.0
-        pulls.append(
-            (
-                (one.slope_g_V - zero / 12.0) / one.slope_error_g_V,
-                (one.sensitivity[4] - gain / 12.0) / one.sensitivity_error[4],
-                (across.value - size) / across.error,
-                away / across.direction_error_deg,
-            )
-        )
+        off = (one.slope_g_V - zero / 12.0, one.sensitivity[4] - gain / 12.0, across.value - size, away)
+        stated = (one.slope_error_g_V, one.sensitivity_error[4], across.error, across.direction_error_deg)
+        pulls.append(np.divide(off, stated))
     assert np.all(np.abs(np.std(pulls, axis=0, ddof=1) - 1.0) < 0.12)
 
 
@@ -84,9 +80,8 @@ def test_a_curve_symmetric_about_the_first_supply_has_its_departure_and_a_slope(
 
 def test_no_transverse_sensitivity_gives_an_upper_limit_and_no_direction(rng: np.random.Generator) -> None:
     angle = np.radians(np.arange(0.0, 360.0, 45.0))
-    fits = [
-        fit_transverse(np.cos(angle), np.sin(angle), 1e-5 * rng.normal(size=8), np.full(8, 1e-5)) for _ in range(300)
-    ]
+    across, error = (np.cos(angle), np.sin(angle)), np.full(8, 1e-5)
+    fits = [fit_transverse(*across, 1e-5 * rng.normal(size=8), error) for _ in range(300)]
     assert sum(one.low > 0.0 for one in fits) <= 10  # 1.1 % expected
     assert all((one.direction_error_deg == 180.0) == (one.low == 0.0) for one in fits)
     with pytest.raises(NotIdentified, match="turn over a whole circle"):
@@ -111,3 +106,46 @@ def test_a_phase_that_differs_between_records_leaves_no_trace_in_the_transverse_
     assert abs(fit_transverse(np.cos(angle), np.sin(angle), apart, np.full(angle.size, 5e-6)).value - 0.002915) > 1e-4
     with pytest.raises(NotIdentified, match="does not answer"):
         relative_phase(drive, 0.0 * answer)
+
+
+RATE, COUNT = 4000.0, 8000
+TIME = np.arange(COUNT) / RATE
+
+
+@pytest.mark.slow
+def test_amplitudes_near_the_noise_are_right_on_average_in_power_and_their_error_is_that_of_draws() -> None:
+    rng = np.random.default_rng(2)
+    sigma = 1.0
+    true = 8.0 * sigma * np.sqrt(2.0 / COUNT)
+    lines = [
+        ripple_line(0.3 + true * np.sin(2.0 * np.pi * 123.0 * TIME + 1.0) + rng.normal(0.0, sigma, COUNT), RATE, 123.0)
+        for _ in range(120)
+    ]
+    amplitude = np.array([one.amplitude for one in lines])
+    assert np.sqrt(np.mean(amplitude**2)) == pytest.approx(true, rel=0.03)
+    assert np.std(amplitude) == pytest.approx(np.mean([one.error for one in lines]), rel=0.1)
+
+
+def test_noise_that_is_louder_at_low_frequencies_makes_no_line() -> None:
+    rng = np.random.default_rng(3)
+    f = np.fft.rfftfreq(COUNT, 1.0 / RATE)
+    found = []
+    for _ in range(100):
+        spectrum = (rng.standard_normal(f.size) + 1j * rng.standard_normal(f.size)) / np.sqrt(np.maximum(f, 0.1))
+        line = ripple_line(np.fft.irfft(spectrum, COUNT), RATE, 20.0)
+        found.append(line.amplitude > 4.0 * line.error)
+    assert np.mean(found) < 0.02
+
+
+def test_a_clear_line_of_another_clock_is_found_at_its_own_frequency() -> None:
+    record = np.sin(2.0 * np.pi * 1000.0 * (1.0 + 3e-4) * TIME)
+    assert ripple_line(record, RATE, 1000.0).amplitude == pytest.approx(1.0, abs=1e-3)
+
+
+def test_rejection_is_the_ratio_in_db_and_no_more_than_the_noise_shows() -> None:
+    value, u = rejection_db(Line(0.1, 0.001), Line(1e-4, 1e-6))
+    assert value == pytest.approx(60.0)
+    assert u == pytest.approx(8.686 * np.hypot(0.01, 0.01), rel=1e-3)
+    hidden, wide = rejection_db(Line(0.1, 0.001), Line(0.0, 1e-6))
+    assert hidden == pytest.approx(100.0)
+    assert wide == pytest.approx(8.686, rel=0.01)

@@ -52,13 +52,10 @@ def test_equal_noise_of_many_units_is_not_found_to_grow_where_classes_of_force_d
     assert by_force(model) is None
 
 
-@pytest.mark.parametrize(
-    "name",
-    mostly_slow(
-        ["third_order_2", "cross_coupling_2", "adc_nonlinearity_5", "scale_temperature_quadratic_2", "aging_linear_2"],
-        *["third_order_2", "adc_nonlinearity_5"],
-    ),
-)
+EFFECTS = ["third_order_2", "cross_coupling_2", "adc_nonlinearity_5", "scale_temperature_quadratic_2", "aging_linear_2"]
+
+
+@pytest.mark.parametrize("name", mostly_slow(EFFECTS, "third_order_2", "adc_nonlinearity_5"))
 def test_an_effect_is_no_noise(name):
     assert by_force(run_of(HIDDEN[name], SEED).model()) is None
 

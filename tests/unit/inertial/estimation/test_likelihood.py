@@ -10,17 +10,10 @@ from scipy import stats
 from benchmarks.large_lots import MODEL, many_units
 from inertial.criticism.noise_draws import NoiseDraws
 from inertial.effects import get_all
+from inertial.estimation import likelihood
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import Covariance
-from inertial.estimation.likelihood import (
-    Common,
-    common_at,
-    common_fit,
-    known_together,
-    likelihood_ratio,
-    together,
-    weighed,
-)
+from inertial.estimation.likelihood import Common, known_together, likelihood_ratio, together, weighed
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.penalty import price
@@ -32,12 +25,9 @@ from inertial.estimation.term import Term
 
 def blank(units: int, axes: int, n: int, y: np.ndarray, error: np.ndarray | None = None) -> Space:
     """The space of a model without columns, of white noise of variance one."""
-    time, error = (
-        np.tile(np.arange(n) * 30.0, (units * axes, 1)),
-        np.ones((units * axes, n)) if error is None else error,
-    )
-    none = np.zeros((units * axes, n, 0))
-    return Space(Covariance(time, error, axes=axes), Noise(Shares(), np.ones(units * axes)), y, none, none)
+    time, none = np.tile(np.arange(n) * 30.0, (units * axes, 1)), np.zeros((units * axes, n, 0))
+    covariance = Covariance(time, np.ones(time.shape) if error is None else error, axes=axes)
+    return Space(covariance, Noise(Shares(), np.ones(units * axes)), y, none, none)
 
 
 @pytest.mark.parametrize(("drop", "own"), [(100.0, 240.0), (100.0, 220.0), (100.0, 900.0), (2.0, 300.0), (2.0, 200.0)])
@@ -80,7 +70,7 @@ def test_what_all_units_share_is_fitted_with_missing_dwells_and_units_of_other_n
     common = np.einsum("bngp,bp->bn", columns, np.tile(rng.standard_normal((3, 2)), (4, 1)))
     space = blank(4, 3, 20, 1e4 * common, error)
     candidate = Candidate(columns, shared=False)
-    np.testing.assert_allclose(common_fit(space, candidate, 0), space.residual, atol=1e-6)
+    np.testing.assert_allclose(likelihood.common_fit(space, candidate, 0), space.residual, atol=1e-6)
     gain = space.gain(candidate)
     assert float(gain.common[0]) == pytest.approx(space.rss)
     assert (int(gain.common_rank[0]), int(gain.rank[0])) == (6, 24)
@@ -96,7 +86,7 @@ def test_the_common_part_of_a_gain_is_the_same_at_noise_that_includes_the_effect
     for size in (1.0, 5.0):
         space = blank(12 // axes, axes, 60, y, size * np.ones((12, 60)))
         gain = space.gain(Candidate(columns, shared=False))
-        parts.append(common_at(space, gain, 0))
+        parts.append(likelihood.common_at(space, gain, 0))
         if axes == 12:  # of one unit, or of norms, nothing is common
             np.testing.assert_allclose(gain.common, gain.drop)
             assert (parts[-1].units, weighed(90.0, 12, 0, common=parts[-1])) == (1, weighed(90.0, 12, 0))
@@ -143,12 +133,9 @@ def test_a_ratio_keeps_no_model_with_its_columns(monkeypatch: pytest.MonkeyPatch
 
 
 def test_pieces_of_a_candidate_hold_its_grid_once_under_keys_of_their_own() -> None:
-    """The draws of a large lot take a candidate in pieces, whose stored products must not be those of another piece."""
     columns = np.random.default_rng(4).standard_normal((3, 5, 7, 2))
     whole = Candidate(columns, shared=False, rows=np.tile(np.arange(3), 4), key="effect")
     pieces = list(whole.pieces(5))
     assert np.array_equal(np.concatenate([piece.columns for piece in pieces], axis=2), columns)
     assert (len(pieces), len({piece.key for piece in pieces})) == (4, 4)
-    assert [piece.columns.shape[2] for piece in whole.pieces(1)] == [1] * 7
-    assert list(whole.pieces(14)) == [whole]
-    assert np.array_equal(whole.at(6), whole.of_blocks[:, :, 6])
+    assert (list(whole.pieces(14)), len(list(whole.pieces(1)))) == ([whole], 7)

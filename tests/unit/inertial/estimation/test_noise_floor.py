@@ -24,7 +24,6 @@ def model_with(added_ug: np.ndarray) -> Model:
 
 
 def left_ug(model: Model) -> float:
-    """RMS of the residuals, µg."""
     return 1e6 * rms(fitted_residuals(model))
 
 
@@ -58,9 +57,7 @@ def test_what_noise_leaves_is_the_mean_of_least_squares_on_noise_that_is_drawn(s
     # bias and slope of each block, one column that all share
     own = np.stack([np.ones((blocks, n)), np.broadcast_to(np.linspace(-1.0, 1.0, n), (blocks, n))], axis=-1)
     same = rng.normal(size=(blocks, n))
-    design = np.concatenate(
-        [np.kron(np.eye(blocks), np.ones((n, 2))) * np.tile(own[0], (blocks, blocks)), same.reshape(-1, 1)], axis=1
-    )
+    design = np.column_stack([np.kron(np.eye(blocks), own[0]), same.ravel()])
     weight = np.where(there, covariance.level[:, None] / error, 0.0).ravel()
     drawn = covariance.coloured(noise, rng.standard_normal((blocks, draws, n)))
     series = np.swapaxes(drawn, 0, 1).reshape(draws, -1).T

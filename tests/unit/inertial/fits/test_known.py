@@ -21,7 +21,6 @@ def test_looks_grow_from_the_first_to_before_the_last() -> None:
 
 @pytest.mark.parametrize("dof", [12, 300])
 def test_a_run_that_ends_at_the_first_look_within_its_guard_seldom_has_a_larger_noise(dof: int) -> None:
-    """Looks at growing data: at any of them the true noise is beyond the guard of the estimated one in at most 5 %."""
     counts = [dof + k for k in looks_at(10, 100)]
     noise = np.random.default_rng(5).standard_normal((LOTS, counts[-1]))
     wrong = np.zeros(LOTS, dtype=bool)
@@ -45,19 +44,19 @@ def test_only_what_is_asked_for_is_compared() -> None:
     assert largest_ratio(errors, effects, {}) == pytest.approx([0.0, 0.0])
 
 
-def test_a_dwell_ends_when_its_mean_is_no_better_known() -> None:
-    """White noise alone: a tenth more variance is a tenth less time. Wander alone: the shortest dwell says as much."""
-    lengths = np.arange(1.0, 21.0)
-    assert chosen_length(DwellNoise(1.0, 0.0, 10.0, 15.0), 10.0, lengths, enough=True) == 10.0
-    assert chosen_length(DwellNoise(0.0, 1.0, 10.0, 15.0), 10.0, lengths, enough=True) == 1.0
-    between = [chosen_length(DwellNoise(w, 1.0, 10.0, 15.0), 10.0, lengths, enough=True) for w in (0.1, 0.2, 0.4, 1.0)]
+def test_a_dwell_ends_when_its_mean_is_no_better_known_and_is_longer_where_the_plan_is_not_enough() -> None:
+    """White noise alone: a tenth more variance is a tenth less time. Wander alone: the shortest dwell says as much.
+
+    Where the plan is not enough, by hand: white variance w·L₀/L times L + b falls with L; wander makes longer ones idle.
+    """
+
+    def length(white: float, wander: float, longest: int = 20, *, enough: bool) -> float:
+        lengths = np.arange(1.0, longest + 1.0)
+        return chosen_length(DwellNoise(white, wander, 10.0, 15.0), 10.0, lengths, enough=enough)
+
+    assert [length(1.0, 0.0, enough=True), length(0.0, 1.0, enough=True)] == [10.0, 1.0]
+    between = [length(white, 1.0, enough=True) for white in (0.1, 0.2, 0.4, 1.0)]
     assert between == sorted(between)
     assert 1.0 < between[1] < 10.0
-
-
-def test_a_dwell_is_longer_where_the_plan_is_not_enough() -> None:
-    """By hand: white variance w·L₀/L times L + b falls with L: the longest is the best; wander makes longer ones idle."""
-    lengths = np.arange(1.0, 21.0)
-    assert chosen_length(DwellNoise(1.0, 0.0, 10.0, 15.0), 10.0, lengths, enough=False) == 20.0
-    assert chosen_length(DwellNoise(0.0, 1.0, 10.0, 15.0), 10.0, lengths, enough=False) == 10.0
-    assert chosen_length(DwellNoise(1.0, 0.0, 10.0, 15.0), 10.0, lengths[:5], enough=False) == 10.0
+    assert [length(1.0, 0.0, enough=False), length(0.0, 1.0, enough=False)] == [20.0, 10.0]
+    assert length(1.0, 0.0, 5, enough=False) == 10.0

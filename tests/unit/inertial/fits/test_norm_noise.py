@@ -52,10 +52,8 @@ def test_the_error_of_the_bias_of_a_record_is_that_of_a_simulation(rng: np.rando
 def test_intervals_hold_the_truth_for_unequal_dwells() -> None:
     """300 recordings on other seeds: 94.7 to 97.9 % (benchmarks/recording_intervals.py); 90 % at the best noise alone."""
     names = ("white 280, B 30", "white 25, B 30", "white 100, axes 1:2:3")
-    per_recording = [
-        pulls(Recording((24, 30, 40)[k % 3], names[k % 3], long_first=k % 2 == 0), 300 + k) for k in range(6)
-    ]
-    own = np.concatenate([np.concatenate(one) for one in per_recording])
+    made = [Recording((24, 30, 40)[k % 3], names[k % 3], long_first=k % 2 == 0) for k in range(6)]
+    own = np.concatenate([part for k, one in enumerate(made) for part in pulls(one, 300 + k)])
     assert np.mean(np.abs(own) <= 2.0) > 0.9
     assert own.std() > 0.5
 
@@ -91,6 +89,14 @@ def test_a_run_with_temperature_that_the_model_lacks_is_noise_of_a_stated_size(r
     np.testing.assert_allclose(np.cov(whiten @ drawn.T), np.eye(12), atol=0.05)
 
 
+def fitted(output: np.ndarray, time: np.ndarray, heat: np.ndarray, sd: float, samples: int):
+    """The fit of dwells (n, 3) of one unit by the norm of gravity."""
+    table = pd.DataFrame(output, columns=["out_x", "out_y", "out_z"])
+    table[["sd_x", "sd_y", "sd_z"]] = sd
+    about = {"unit": "U", "dwell": range(len(time)), "time_s": time, "unit_C": heat, "n": samples, "out_unit": "g"}
+    return norms_fitted(table.assign(kind="dwell", **about), None, PLAIN).fit.fit
+
+
 @pytest.mark.slow
 def test_biases_of_a_sensor_that_warms_hold_at_the_mean_temperature_of_its_dwells(rng: np.random.Generator) -> None:
     """20 stops in 140 s, one more on its feet at the end; a bias that warmed by 4 K passed for a walk, and z was off by 1 K."""
@@ -103,11 +109,7 @@ def test_biases_of_a_sensor_that_warms_hold_at_the_mean_temperature_of_its_dwell
         slope = 600e-6 * np.array([1.0, -1.0, 1.0])
         noise = 100e-6 * rng.standard_normal((21, 3))
         output = force + (heat - heat.mean())[:, None] * slope + noise
-        table = pd.DataFrame(output, columns=["out_x", "out_y", "out_z"]).assign(
-            unit="F", dwell=range(21), time_s=time, unit_C=heat, kind="dwell", out_unit="g", n=400
-        )
-        table[["sd_x", "sd_y", "sd_z"]] = 2e-3
-        fit = norms_fitted(table, None, PLAIN).fit.fit
+        fit = fitted(output, time, heat, 2e-3, 400)
         off += (fit.coefficients[0, :, 0] / (2.0 * fit.standard_errors[0, :, 0])).tolist()
         assert np.median(fit.standard_errors[0, :, 0]) < 400e-6
     assert np.mean(np.abs(off) <= 1.0) >= 0.9
@@ -132,13 +134,8 @@ def test_a_long_record_that_warms_has_the_runs_in_its_errors(rng: np.random.Gene
     direction[:1200, 0] *= 0.1
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     heat = 25.0 + 4.0 * np.linspace(0.0, 1.0, count)
-    output = (
-        direction + (0.01 + 300e-6 * (heat - 27.0))[:, None] * [1.0, 0.0, 0.0] + 5e-5 * rng.standard_normal((count, 3))
-    )
-    table = pd.DataFrame(
-        {"unit": "U", "dwell": np.arange(count), "time_s": 20.0 * np.arange(count), "unit_C": heat, "n": 100}
-    )
-    table[["out_x", "out_y", "out_z"]], table[["sd_x", "sd_y", "sd_z"]] = output, 5e-4
-    fit = norms_fitted(table.assign(out_unit="g"), None, PLAIN).fit.fit
+    output = direction + 5e-5 * rng.standard_normal((count, 3))
+    output[:, 0] += 0.01 + 300e-6 * (heat - 27.0)
+    fit = fitted(output, 20.0 * np.arange(count), heat, 5e-4, 100)
     error = fit.coefficients[0, 0, 0] - 0.01
     assert abs(error) < 3.0 * fit.standard_errors[0, 0, 0] < 100e-6

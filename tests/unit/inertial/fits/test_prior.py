@@ -28,11 +28,8 @@ def estimates(
     rng: np.random.Generator, units: int = UNITS, lot: float = 0.2, off: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of a lot of that family with errors of 0.5, ``off`` from its mean in the bias, and their covariances."""
-    values = (
-        rng.standard_normal((units, 3, P))
-        + lot * rng.standard_normal((3, P))
-        + 0.5 * rng.standard_normal((units, 3, P))
-    )
+    own, of_lot, error = (rng.standard_normal(shape) for shape in ((units, 3, P), (3, P), (units, 3, P)))
+    values = own + lot * of_lot + 0.5 * error
     values[..., 0] += off
     return values, np.broadcast_to(0.25 * np.eye(P), (units, 3, P, P))
 
@@ -56,16 +53,7 @@ def test_it_is_the_fit_of_the_observations_and_the_prior_together(rng: np.random
     np.testing.assert_allclose(found.share, np.diagonal(of_prior) / np.diagonal(found.covariance), rtol=1e-9)
 
 
-def test_a_prior_of_no_precision_is_none(rng: np.random.Generator) -> None:
-    values, covariance = estimates(rng)
-    found = combined(values, covariance, np.full((3, P), 7.0), np.zeros((3, P, P)))
-    np.testing.assert_allclose(found.coefficients, values)
-    np.testing.assert_allclose(found.covariance, covariance)
-    assert not found.share.any()
-
-
 def test_lots_of_the_family_have_its_prior(rng: np.random.Generator) -> None:
-    """Nulls: units that do not fit are below one in a hundred, widened lots below one in twenty."""
     priors = [judged(family(), NAMES, *estimates(rng)) for _ in range(300)]
     assert np.mean([~prior.fits for prior in priors]) < 0.01
     assert np.mean([bool(prior.widened) for prior in priors]) < 0.05
@@ -105,7 +93,6 @@ def test_heavy_tails_keep_units_that_normal_ones_would_lose(rng: np.random.Gener
 
 
 def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rng: np.random.Generator) -> None:
-    """Coefficients, covariance and residuals of dwells left out, against dense matrices at the noise that the fit found."""
     state: State = posed(np.tile(poses.plan("fibonacci24"), (2, 1)), 30.0)
     n, used = 48, np.arange(48) < 40
     time = np.broadcast_to(state.time, n)
@@ -116,9 +103,8 @@ def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rn
     precision = np.diag([1.0, 4.0, 1.0, 0.25]) / (1e-5) ** 2
     error = np.full(out.shape, WHITE)
     alone = fit_lot_with_wander(EFFECTS, state, out, error, used=used)
-    found = fit_lot_with_wander(
-        EFFECTS, state, out, error, used=used, believed=lambda t, c: combined(t, c, mean, precision)
-    )
+    with_prior = {"used": used, "believed": lambda t, c: combined(t, c, mean, precision)}
+    found = fit_lot_with_wander(EFFECTS, state, out, error, **with_prior)
     kernels = wander_kernels(time, used)
     shares = (alone.flicker_share, alone.walk_share)
     whole = np.eye(n) + sum(s * k for s, k in zip(shares, kernels, strict=True))
@@ -130,9 +116,7 @@ def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rn
         gain = both @ rows[used].T @ inside
         theta = out[:, used, axis] @ gain.T + both @ precision @ mean[axis]
         np.testing.assert_allclose(found.fit.coefficients[:, axis], theta, rtol=1e-7, atol=1e-11)
-        np.testing.assert_allclose(
-            found.fit.covariance[:, axis], np.broadcast_to(both, (UNITS, P, P)), rtol=1e-6, atol=1e-16
-        )
+        np.testing.assert_allclose(found.fit.covariance[:, axis], [both] * UNITS, rtol=1e-6, atol=1e-16)
         np.testing.assert_allclose(found.fit.residuals[..., axis], out[..., axis] - theta @ rows.T, atol=1e-10)
         take = np.eye(n)[~used]
         take[:, used] -= rows[~used] @ gain
@@ -144,7 +128,6 @@ def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rn
 
 
 def test_own_earlier_calibrations_take_the_place_of_the_family(rng: np.random.Generator) -> None:
-    """Units far from the family's mean are judged by themselves; one that changed meanwhile has no prior."""
     values, covariance = estimates(rng, 4)
     values[:2] += 30.0
     values[2] -= 30.0

@@ -11,16 +11,12 @@ from inertial.fits.wander import wander_kernels
 def series(rng: np.random.Generator, blocks: int = 4, n: int = 40) -> Series:
     time = np.cumsum(rng.uniform(10.0, 40.0, n))
     h = np.concatenate([np.ones((blocks, 3, n, 1)), rng.normal(size=(blocks, 3, n, 3))], axis=-1)
-    z = (
-        1e5 * h.sum(axis=-1)
-        + rng.normal(size=(blocks, 3, n))
-        + 0.3 * np.cumsum(rng.normal(size=(blocks, 3, n)), axis=-1)
-    )
+    white, steps = rng.normal(size=(2, blocks, 3, n))
+    z = 1e5 * h.sum(axis=-1) + white + 0.3 * np.cumsum(steps, axis=-1)
     return Series(h, np.zeros((blocks, 3, n, 0)), z, rng.uniform(0.9, 1.1, n), wander_kernels(time))
 
 
 def assert_grid_is_the_fit(own: Series, first: np.ndarray, second: np.ndarray) -> None:
-    """The grid holds the deviance of the fit at every pair of shares."""
     one_by_one = np.array([[own.solve((s, t)).deviance for t in second] for s in first])
     np.testing.assert_allclose(own.deviances(first, second), one_by_one, rtol=0.0, atol=1e-6)
 
@@ -60,20 +56,7 @@ def test_shares_that_made_the_series_are_found(rng: np.random.Generator) -> None
     assert walk == pytest.approx(40 * 0.09, rel=0.5)
 
 
-def test_shares_are_those_of_the_likelihood_worked_out_pair_by_pair(rng, monkeypatch):
-    own = series(rng)
-    shares = own.best_shares()
-
-    def pair_by_pair(self, first, second):
-        return np.array([[self.solve((one, other)).deviance for other in second] for one in first])
-
-    monkeypatch.setattr(Series, "deviances", pair_by_pair)
-    assert own.best_shares() == pytest.approx(shares, rel=1e-8)
-    assert min(shares) > 0.0
-
-
 def test_a_measurement_that_a_block_lacks_is_as_if_it_had_never_been(rng: np.random.Generator) -> None:
-    """Coefficients, shared ones, squares, variance and likelihood of one unit without two dwells, whatever stands there."""
     n, shares = 30, (2.0, 0.7)
     time, kept = np.cumsum(rng.uniform(10.0, 40.0, n)), np.ones(n, dtype=bool)
     kept[[4, 17]] = False
@@ -95,8 +78,7 @@ def test_a_measurement_that_a_block_lacks_is_as_if_it_had_never_been(rng: np.ran
 
 
 def test_blocks_without_gaps_are_untouched_by_those_with_gaps(rng: np.random.Generator) -> None:
-    own = series(rng, blocks=2)
-    missing = np.zeros((2, 40), dtype=bool)
+    own, missing = series(rng, blocks=2), np.zeros((2, 40), dtype=bool)
     missing[1, [3, 30]] = True
     beside = Series(own._h * own._scale, own._s, own._z, np.sqrt(np.diagonal(own.white)), own.kernels, missing)
     one, other = own.solve((1.0, 2.0)), beside.solve((1.0, 2.0))

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import made_worlds as _  # noqa: F401
 import numpy as np
-import pytest
 
 from inertial import effects
 from inertial.criticism.classes import EffectClass, Member
@@ -64,27 +63,14 @@ def test_a_kink_that_may_move_is_not_promised_as_far_away_as_one_that_may_not() 
     assert free < 0.5 * fixed * pair.weight / pair.variance
 
 
-@pytest.mark.slow
-def test_what_is_proposed_parts_the_rivals_when_it_is_measured() -> None:
-    """One run of the benchmark `python benchmarks/worlds part`, with a generator that the proposal knows nothing of."""
-    outcome = part.followed(("cubic on 18, faint", 9100))[1]
-    assert outcome["ended"] == "open"
-    made = outcome["proposals"][0]
-    assert made["parted"]
-    assert made["added"] == pytest.approx(1.0, abs=0.3)
-
-
 STEP = SequenceStep(0.1, 0.2, 25.0)
 
 
 def test_equal_steps_in_a_row_are_one_with_their_number_and_one_after_the_devices_were_off_stands_apart() -> None:
-    for steps, repeats, off in (
-        ((STEP, STEP, replace(STEP, inner=0.3), STEP), [2, 1, 1], [None] * 3),
-        ((STEP, STEP, replace(STEP, off=600.0), STEP, STEP), [2, 1, 2], [None, 600.0, None]),
+    pair = ("warm_up", "aging_log")
+    made = Proposal(1.0, 30.0, pair, kinds=("poses",), steps=(), pair=pair, minutes=12.0, settled=1.0)
+    for steps, told in (
+        ((STEP, STEP, replace(STEP, inner=0.3), STEP), [(2, None), (1, None), (1, None)]),
+        ((STEP, STEP, replace(STEP, off=600.0), STEP, STEP), [(2, None), (1, 600.0), (2, None)]),
     ):
-        rivals_ = ("warm_up", "aging_log")
-        rows = rows_of(
-            Proposal(1.0, 30.0, rivals_, kinds=("poses",), steps=steps, pair=rivals_, minutes=12.0, settled=1.0)
-        )
-        assert [row["repeats"] for row in rows] == repeats
-        assert [row.get("off_s") for row in rows] == off
+        assert [(row["repeats"], row.get("off_s")) for row in rows_of(replace(made, steps=steps))] == told

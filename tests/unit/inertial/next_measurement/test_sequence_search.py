@@ -51,10 +51,14 @@ SEQUENCES = st.lists(
 )
 
 
+def search_of(drawn: list[tuple[float, float, Kind]]) -> Told:
+    minutes, shares, kinds = zip(*drawn, strict=True)
+    return Told(list(minutes), list(shares), list(kinds))
+
+
 @given(SEQUENCES)
 def test_the_best_of_each_kind_are_those_of_judging_every_sequence(drawn: list[tuple[float, float, Kind]]) -> None:
-    search = Told([m for m, _, _ in drawn], [share for _, share, _ in drawn], [kind for _, _, kind in drawn])
-    given_ = [(o.course.kind, o.rate) for o in Offers(search, [], NOW).by_kind()]
+    given_ = [(o.course.kind, o.rate) for o in Offers(search_of(drawn), [], NOW).by_kind()]
     best: dict[str, float] = {}
     for minutes, share, kind in drawn:
         if minutes <= BUDGET and share - NOW >= min(LEAST, 0.5 * (1.0 - NOW)):
@@ -65,14 +69,12 @@ def test_the_best_of_each_kind_are_those_of_judging_every_sequence(drawn: list[t
 
 @given(SEQUENCES, st.floats(1.0, 120.0))
 def test_the_shortest_that_reaches_an_aim_is_that_of_judging_every_sequence(drawn, below):
-    search = Told([m for m, _, _ in drawn], [share for _, share, _ in drawn], [kind for _, _, kind in drawn])
-    offer = Offers(search, [], NOW).shortest(0.6, below)
+    offer = Offers(search_of(drawn), [], NOW).shortest(0.6, below)
     reach = [minutes for minutes, share, _ in drawn if share >= 0.6 and minutes < below and minutes <= BUDGET]
     assert (None if offer is None else offer.minutes) == (min(reach) if reach else None)
 
 
 def test_long_sequences_are_not_judged_where_a_short_one_brings_more_than_they_can() -> None:
-    minutes = [5.0, *np.linspace(30.0, 80.0, 20)]
-    search = Told(minutes, [0.9] * 21, ["poses", *("soaks" for _ in range(20))])
+    search = search_of([(5.0, 0.9, "poses"), *((m, 0.9, "soaks") for m in np.linspace(30.0, 80.0, 20))])
     assert next(Offers(search, [], NOW).by_kind()).minutes == 5.0
     assert search.judged == [0]

@@ -19,7 +19,7 @@ SHAPE = (12, 60_000)
 def test_white_noise_has_its_one_sided_density_and_identifies_nothing_else() -> None:
     curve = overlapping(generate.white(np.random.default_rng(1), SHAPE, 280e-6, RATE), RATE)
     terms = fit_terms(curve)
-    assert np.mean(terms.value[..., terms.symbols.index("N")]) * np.sqrt(2.0) == pytest.approx(280e-6, rel=0.005)
+    assert terms.symbols.index("N") == 1
     assert np.mean(terms.value[:, 1]) == pytest.approx(280e-6 / np.sqrt(2.0), rel=0.005)
     assert np.isnan(terms.value[:, [0, 2, 3, 4]]).mean() > 0.9
     assert np.all(terms.high > 0.0)

@@ -19,7 +19,6 @@ def histories(rng: np.random.Generator, units: int = 800, calibrations: int = 8)
 
 
 def pairs_of(values, errors, years):
-    """Neighbouring calibrations, and the first with the last."""
     change = [np.diff(values, axis=1).ravel(), values[:, -1] - values[:, 0]]
     time = [np.diff(years, axis=1).ravel(), years[:, -1] - years[:, 0]]
     known = np.full(sum(c.size for c in change), 2.0 * errors[0, 0] ** 2)
@@ -27,7 +26,6 @@ def pairs_of(values, errors, years):
 
 
 def judged(values, errors, years):
-    """The drift of a kind, and where its units stand."""
     kind = kind_of(*pairs_of(values, errors, years))
     return kind, standing(values, errors, years, kind)
 

@@ -6,11 +6,12 @@ Shares of 4000 series a case: `python benchmarks/noise_verdicts.py series`.
 import independent_noise as made
 import numpy as np
 import pytest
+from each import each
 from long_suites import mostly_slow
 
 from inertial.population.capability import cpk, shape_of
 from inertial.population.change_points import change_points, noise_of
-from inertial.population.comparison import e_n, holm, outlier_limit, robust_z
+from inertial.population.comparison import outlier_limit, robust_z
 from inertial.population.control_charts import alarms, baseline, chance_of_alarms, signals
 from inertial.population.fingerprints import alike_below, change_scale, distance, foreign_above, nearest
 from inertial.population.gauge import gauge_study
@@ -54,15 +55,6 @@ def _p_of_alarms(values: np.ndarray, first: int) -> float:
     rules, moving = signals(values, baseline(values, first))
     chance = chance_of_alarms(values, first, values.size - first)
     return chance.p_value(alarms(rules, moving.outside, np.arange(values.size) >= first))
-
-
-def test_a_coverage_factor_of_few_values_makes_e_n_smaller() -> None:
-    """JCGM 100, table G.2: t at 95.45 % is 4.53, 2.65 and 2.28 for 2, 5 and 10 degrees of freedom."""
-    one = np.ones(1)
-    for dof, factor in ((2.0, 4.53), (5.0, 2.65), (10.0, 2.28)):
-        assert e_n(one, 0.0 * one, one, 0.0 * one, dof)[0] == pytest.approx(1.0 / factor, rel=2e-3)
-    assert e_n(one, 0.0 * one, one, 0.0 * one)[0] == 0.5
-    np.testing.assert_allclose(holm(np.array([0.001, np.nan, 0.2])), [0.003, 1.0, 0.4])  # one could not be compared
 
 
 def test_a_foreign_unit_is_told_and_its_own_history_is_found(rng):
@@ -155,11 +147,9 @@ def test_a_series_that_stands_still_changes_as_seldom_as_is_said(n: int, memory:
     assert np.sum(p < 1e-3) <= 2
 
 
-@pytest.mark.parametrize(
-    ("n", "at", "memory", "size", "least"),
-    [(40, 20, 0.0, 4.0, 0.85), (100, 50, 0.0, 2.0, 0.9), (120, 70, 0.0, 2.5, 0.85), (120, 70, 0.6, 6.0, 0.85)],
-)
-def test_a_step_is_told_where_it_is(n: int, at: int, memory: float, size: float, least: float) -> None:
+@each([(40, 20, 0.0, 4.0, 0.85), (100, 50, 0.0, 2.0, 0.9), (120, 70, 0.0, 2.5, 0.85), (120, 70, 0.6, 6.0, 0.85)])
+def test_a_step_is_told_where_it_is(row: tuple[int, int, float, float, float]) -> None:
+    n, at, memory, size, least = row
     moved = made.autoregressive(np.random.default_rng(20_261_124), 40, n, memory) + size * (np.arange(n) >= at)
     assert np.mean([any(abs(c.first - at) <= 3 for c in change_points(one)) for one in moved]) >= least
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stations.plant.hidden.package import DRY_MIDDLE, LeakyLid, MoistureDiffusion, YieldingAdhesive
+from stations.plant.hidden.package import DRY_MIDDLE, LeakyLid, MoistureDiffusion
 
 REST = np.zeros((1, 3))
 WARM = np.array([25.0])
@@ -38,25 +38,6 @@ def test_water_moves_faster_in_the_heat() -> None:
     # uptake grows with the root of D·t at the beginning
     faster = np.exp(0.45 / 8.617e-5 * (1.0 / 298.15 - 1.0 / 328.15))
     assert taken[1] / taken[0] == pytest.approx(np.sqrt(faster), rel=0.1)
-
-
-def test_the_second_shock_of_the_same_size_changes_nothing_and_a_slow_cycle_neither() -> None:
-    def after(rates: list[float]) -> list[float]:
-        adhesive, temperature, states = YieldingAdhesive(), 80.0, list[float]()
-        adhesive.slow(np.array([temperature]), REST, 1.0)
-        for rate in rates:
-            for target in (-40.0, 80.0):
-                while temperature != target:
-                    temperature += float(np.clip(target - temperature, -rate, rate))
-                    adhesive.slow(np.array([temperature]), REST, 1.0)
-                held = [adhesive.slow(np.array([temperature]), REST, 1.0)[0, 0] for _ in range(1800)]
-                states.append(float(held[-1]))
-        return states
-
-    assert after([0.05]) == [0.0, 0.0]
-    _, first, _, second = after([2.0, 2.0])
-    assert first > 20.0
-    assert second == pytest.approx(first, abs=1e-6)
 
 
 def test_gas_leaks_out_at_low_pressure_and_the_lid_bends_inwards_afterwards() -> None:
