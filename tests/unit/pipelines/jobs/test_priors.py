@@ -22,6 +22,11 @@ from schemas.recipe import Recipe
 SPREAD = 1e-3
 
 
+def middle(recipe: Recipe) -> np.ndarray:
+    """The mean of the family, (axes, coefficients)."""
+    return np.array([[effect == "scale" for effect, _ in axis] for axis in column_names(recipe.effects)])
+
+
 @pytest.fixture
 def recipe(tmp_path: Path) -> Recipe:
     return load_recipe(recipe_file(tmp_path, *BRIEF)).model_copy(update={"prior": PriorTerms()})
@@ -68,8 +73,7 @@ def test_units_that_were_calibrated_before_have_a_prior_of_their_own(
     assert list(found.own) == ["E03-1"]
     mean, covariance = found.own["E03-1"]
     first = np.random.default_rng([7, 3]).standard_normal((UNITS, 3, 4))[1]
-    middle = np.array([[effect == "scale" for effect, _ in axis] for axis in column_names(recipe.effects)])
-    np.testing.assert_allclose(mean, LSB * (middle + SPREAD * first), atol=3.0)
+    np.testing.assert_allclose(mean, LSB * (middle(recipe) + SPREAD * first), atol=3.0)
     assert np.all(np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)) < 0.02 * LSB * SPREAD)
     of_family, of_units = (
         planned_precision(one, str(archive.root), "simulated")
@@ -93,8 +97,7 @@ def test_a_unit_leans_on_its_wafer(recipe: Recipe, tmp_path: Path) -> None:
     assert found is not None
     assert stored.groups == {"new": "wafer W03"}
     mean, covariance = found.own["new"]
-    middle = np.array([[effect == "scale" for effect, _ in axis] for axis in column_names(recipe.effects)])
-    true = LSB * (middle + wafers * np.random.default_rng([8, 3]).standard_normal(middle.shape))
+    true = LSB * (middle(recipe) + wafers * np.random.default_rng([8, 3]).standard_normal((3, 4)))
     u = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     assert np.mean(np.abs(mean - true) < 2.0 * u) > 0.8
     whole = np.sqrt(np.diagonal(found.within + found.between, axis1=-2, axis2=-1))
@@ -103,7 +106,7 @@ def test_a_unit_leans_on_its_wafer(recipe: Recipe, tmp_path: Path) -> None:
         stored_family(recipe.model_copy(update={"prior": PriorTerms(attribute="wafre")}), archive, set(), "simulated")
 
 
-def test_calibrations_that_say_nothing_of_the_family_do_not_count(
+def test_calibrations_that_say_nothing_of_the_family_do_not_count_and_an_archive_without_one_is_refused(
     recipe: Recipe, archive: Archive, tmp_path: Path
 ) -> None:
     root, name = Path(str(archive.root)), recipe_file(tmp_path, *BRIEF)
@@ -112,11 +115,6 @@ def test_calibrations_that_say_nothing_of_the_family_do_not_count(
     stored = stored_family(recipe, archive, set(), "simulated")
     assert stored is not None
     assert stored.units == LOTS * UNITS
-
-
-def test_an_archive_without_a_family_is_refused_and_a_recipe_without_a_prior_reads_none(
-    recipe: Recipe, archive: Archive, tmp_path: Path
-) -> None:
     for changes, kind, what in (
         ({"device": "qa700"}, "simulated", "no calibration of qa700 with this model"),
         ({}, "modbus", "no calibration of adxl355 with this model"),
@@ -124,11 +122,8 @@ def test_an_archive_without_a_family_is_refused_and_a_recipe_without_a_prior_rea
     ):
         with pytest.raises(RecipeInvalid, match=what):
             stored_family(recipe.model_copy(update=changes), archive, set(), kind)
-    plain = recipe.model_copy(update={"prior": None})
-    assert stored_family(plain, Archive(tmp_path / "none"), set(), "simulated") is None
-
-
-def test_too_few_lots_are_refused(recipe: Recipe, tmp_path: Path) -> None:
-    small = family_archive(tmp_path / "small", recipe_file(tmp_path, *BRIEF), SPREAD, lots=4)
+    small = family_archive(tmp_path / "small", name, SPREAD, lots=4)
     with pytest.raises(RecipeInvalid, match=r"16 calibrations in 4 lots, 4 coefficients need 8 lots"):
         stored_family(recipe, small, set(), "simulated")
+    plain = recipe.model_copy(update={"prior": None})
+    assert stored_family(plain, Archive(tmp_path / "none"), set(), "simulated") is None
