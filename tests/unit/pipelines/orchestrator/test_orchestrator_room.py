@@ -3,11 +3,9 @@
 import gc
 
 import pytest
-import yaml
 from each import each
 from hypothesis import given
 from hypothesis import strategies as st
-from root_process import ROOT
 
 from pipelines.archive import Archive
 from pipelines.orchestrator.archive_address import (
@@ -72,9 +70,6 @@ def test_a_command_names_its_archive_without_credentials_and_flow_and_worker_fin
     assert archive_of(other).address == other
 
 
-DEPLOY = ROOT / "deploy"
-
-
 @given(
     *(st.sampled_from(values) for values in CHOICES.values()),
     st.integers(1, 10080),
@@ -103,14 +98,6 @@ def test_a_policy_with_an_unknown_key_or_value_is_refused(row: tuple[object, str
         policy_of("production-line", content)
     assert told in str(refused.value)
     assert str(refused.value).startswith("production-line: ")
-
-
-def test_the_deployments_of_the_product_state_a_policy() -> None:
-    content = yaml.safe_load((DEPLOY / "prefect.yaml").read_text(encoding="utf-8"))
-    policies = {one["name"]: policy_of(one["name"], one["policy"]) for one in content["deployments"]}
-    assert policies["production-line"] == Policy(crashed="continue")
-    assert policies["on-demand"] == Policy()
-    assert policies["weekly-audit"].missed == "latest"
 
 
 @pytest.fixture
