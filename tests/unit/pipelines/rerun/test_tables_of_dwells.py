@@ -14,7 +14,7 @@ from inertial.effects import additions_forgotten
 from inertial.frames import force_from_angles
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.diagnosis.import_document import import_document
 from pipelines.diagnosis.inputs import judged_effects
 from pipelines.importers.keep import complete_table
@@ -23,6 +23,7 @@ from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.jobs.model_files import use_fitted_model
 from pipelines.jobs.releases import model_digest
 from pipelines.rerun.imported_fit import fit_document
+from pipelines.rerun.reproduce import check
 from pipelines.rerun.rerun import again
 from pipelines.stages.fit import fit
 from pipelines.stages.verify import verify as verified
@@ -55,6 +56,13 @@ def table(rng: np.random.Generator, root: Array | None = None, units: str = "ABC
         columns |= {f"force_{axis}": force[:, k] for k, axis in enumerate("xyz")}
         made.append(pd.DataFrame(columns | {f"out_{axis}": output[:, k] for k, axis in enumerate("xyz")}))
     return pd.concat(made, ignore_index=True)
+
+
+def kept(folder: Path, dwells: pd.DataFrame, **how: object) -> Run:
+    """The run that the import of a table of dwells leaves in the archive of a folder."""
+    dwells.to_csv(folder / "lot.csv", index=False)
+    archive = str(folder / "archive")
+    return Archive(archive).run(import_document([folder / "lot.csv"], how, "", "", archive, None, nullcontext)["run"])
 
 
 def errors_over_uncertainties(root: Array, seed: int, effect: str, lots: int = 8) -> Array:
@@ -113,22 +121,20 @@ def test_a_bad_dwell_of_one_unit_is_left_out_of_it_alone(tmp_path: Path) -> None
     dwells = table(np.random.default_rng(5))
     dwells.loc[(dwells["unit"] == "B") & (dwells["dwell"] == 7), "out_y"] += 0.004
     dwells.loc[dwells["unit"] == "C", "out_x"] *= -1.0
-    path = tmp_path / "lot.csv"
-    dwells.to_csv(path, index=False)
-    done = import_document([path], {"device": "MY-1"}, "", "", str(tmp_path / "archive"), None, nullcontext)
-    archive = Archive(str(tmp_path / "archive"))
-    whole = again(archive, done["run"], ModelChange())
-    assert {archive.run(run).about["lot"]["device"] for run in (done["run"], whole.new)} == {done["device"]} == {"MY-1"}
-    without = again(archive, done["run"], ModelChange(), left_out=(("B", 7),))
+    imported = kept(tmp_path, dwells, device="MY-1")
+    archive = imported.archive
+    whole = again(archive, imported.id, ModelChange())
+    assert {archive.run(run).about["lot"]["device"] for run in (imported.id, whole.new)} == {"MY-1"}
+    without = again(archive, imported.id, ModelChange(), left_out=(("B", 7),))
     bias = [
         run.table("coefficients").query("unit == 'B' and axis == 'y' and effect == 'bias'")["value"].item()
         for run in (archive.run(whole.new), archive.run(without.new))
     ]
     assert abs(bias[0] - BIAS_G) > 5e-5 > abs(bias[1] - BIAS_G)
-    kept = archive.run(without.new)
-    assert set(kept.about["left_out"]) == {"B:7"}
-    assert set(kept.table("dwells").query("dwell == 7")["unit"]) == {"A", "C"}
-    document = fit_document(kept, whole.new)
+    new = archive.run(without.new)
+    assert set(new.about["left_out"]) == {"B:7"}
+    assert set(new.table("dwells").query("dwell == 7")["unit"]) == {"A", "C"}
+    document = fit_document(new, whole.new)
     assert document["faulty"] == ["C"]
     lines = "\n".join(document["lines"])
     assert "B lacks 7; units are fitted" in lines
@@ -186,15 +192,10 @@ def test_values_that_all_units_share_are_fitted_where_units_lack_dwells() -> Non
 
 
 def test_a_model_that_a_unit_does_not_determine_is_named(rng: np.random.Generator) -> None:
-    outer, inner = rng.uniform(-180.0, 180.0, (2, 20))
-    force = force_from_angles(np.radians(outer), np.radians(inner))
-    outputs = {f"out_{axis}": force[:, k] for k, axis in enumerate("xyz")}
-    one = pd.DataFrame(
-        {"dwell": range(20), "time_s": 40.0 * np.arange(20), "outer_deg": outer, "inner_deg": inner} | outputs
-    )
-    dwells = complete_table(pd.concat([one.assign(unit="A"), one.iloc[:3].assign(unit="B")]))[0]
+    dwells = table(rng, units="AB")
+    short = complete_table(dwells[(dwells["unit"] == "A") | (dwells["dwell"] < 3)])[0]
     with pytest.raises(DataRejected, match=r"unit B has 3 dwells, at least 4 are needed .*; leave the unit out"):
-        fit(dwells, None, [*PLAIN, "outer_encoder_offset"])
+        fit(short.assign(outer_deg=0.0, inner_deg=0.0), None, [*PLAIN, "outer_encoder_offset"])
 
 
 def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
@@ -213,18 +214,36 @@ def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
 
 
 def test_an_import_of_a_table_of_dwells_takes_no_mapping_and_a_day_as_a_mapped_table(tmp_path: Path) -> None:
-    path = tmp_path / "lot.csv"
-    table(np.random.default_rng(8), units="ABCD").assign(slot=3).to_csv(path, index=False)
+    dwells = table(np.random.default_rng(8), units="ABCD").assign(slot=3)
     keys = {"units": {"output": "g"}, "measured": "2026-11-20"}
     with pytest.raises(RecipeInvalid, match="threshold finds dwells in samples, each row is a dwell already"):
-        import_document([path], {**keys, "threshold": 3.0}, "", "", str(tmp_path / "archive"), None, nullcontext)
-    dated = import_document([path], keys, "", "", str(tmp_path / "archive"), None, nullcontext)["run"]
-    assert Archive(str(tmp_path / "archive")).run(dated).about["measured"] == "2026-11-20"
-    done = import_document([path], {"units": {"output": "mg"}}, "", "", str(tmp_path / "archive"), None, nullcontext)
-    run = Archive(str(tmp_path / "archive")).run(done["run"])
+        kept(tmp_path, dwells, **keys, threshold=3.0)
+    assert kept(tmp_path, dwells, **keys).about["measured"] == "2026-11-20"
+    run = kept(tmp_path, dwells, units={"output": "mg"})
     assert run.table("dwells")["out_x"].max() < 2e-3
     assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3, 3]
     assert run.about["name"] == "dwells of A, B, C, …"
+
+
+def test_imported_dwells_are_fitted_with_the_plain_model_and_graded_where_limits_are_named(tmp_path: Path) -> None:
+    imported = kept(tmp_path, table(np.random.default_rng(3), units="A"))
+    archive = imported.archive
+    outcome = again(archive, imported.id, ModelChange())
+    assert outcome.because[0]["what"] == "not fitted yet"
+    bias = archive.run(outcome.new).table("coefficients").query("effect == 'bias'")
+    assert bias["value"].to_numpy() == pytest.approx(BIAS_G, abs=5e-5)
+    assert check(archive, outcome.new).same
+    assert again(archive, outcome.new, ModelChange()).new == outcome.new
+    limits = tmp_path / "limits.toml"
+    limits.write_text('name = "plain"\n[figures]\nzero_g_offset_mg = { max = 5.0, unit = "mg" }\n')
+    change = change_from_options(limits=str(limits))
+    (grade,) = archive.run(again(archive, imported.id, change).new).table("grades").to_dict("records")
+    assert grade["outcome"] == "fail"
+    assert "zero_g_offset_mg fail" in grade["reasons"]
+    words = ("--archive", str(archive.root))
+    limits.write_text('name = "wide"\n[figures]\nzero_g_offset_mg = { max = 50.0, unit = "mg" }\n')
+    command(["fit", imported.id, "--limits", str(limits), *words])
+    assert "yield   all 100 %, import 100 %" in command(["audit", *words]).stdout  # where a station's name would stand
 
 
 GLUE = """
@@ -249,9 +268,8 @@ def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The archive had the coefficients of the earlier file below the verdict on the later one."""
-    path, archive = tmp_path / "lot.csv", Archive(str(tmp_path / "archive"))
-    table(np.random.default_rng(8)).to_csv(path, index=False)
-    imported = import_document([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)["run"]
+    run = kept(tmp_path, table(np.random.default_rng(8)))
+    imported, archive = run.id, run.archive
     runs, evidence = list[str](), set[str]()
     for power in (2, 3, 3):
         own = tmp_path / f"glue_{len(runs)}.py"
@@ -273,22 +291,10 @@ def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(
     assert not np.allclose(squared, cubed)
 
 
-def test_the_yield_of_an_import_is_that_of_imports(tmp_path: Path) -> None:
-    """It has no station, whose name would stand there."""
-    path, limits, words = tmp_path / "lot.csv", tmp_path / "limits.toml", ["--archive", str(tmp_path / "archive")]
-    table(np.random.default_rng(8), units="AB").to_csv(path, index=False)
-    limits.write_text('name = "wide"\n[figures]\nzero_g_offset_mg = { max = 50.0, unit = "mg" }\n')
-    command(["import", str(path), *words])
-    command(["fit", "--limits", str(limits), *words])
-    assert "yield   all 100 %, import 100 %" in command(["audit", *words]).stdout
-
-
 @pytest.mark.parametrize("last", ["dwells.parquet", "dwells.json", "run.json"])
 def test_a_full_disk_leaves_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, last: str) -> None:
     """A run of an import begins when its tables are there; the same import goes on where it was."""
-    path = tmp_path / "lot.csv"
-    table(np.random.default_rng(8)).to_csv(path, index=False)
-    arguments = ([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    dwells = table(np.random.default_rng(8))
 
     def full(target: Path, data: bytes) -> None:
         if target.name == last:
@@ -298,9 +304,9 @@ def test_a_full_disk_leaves_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with monkeypatch.context() as patched:
         patched.setattr("pipelines.archive.files._write_durably", full)
         with pytest.raises(ArchiveUnusable, match="No space left"):
-            import_document(*arguments)
+            kept(tmp_path, dwells)
     archive = Archive(str(tmp_path / "archive"))
     assert archive.runs() == []
     assert verify(archive, keys={}).checked.findings == []
-    assert archive.run(import_document(*arguments)["run"]).table("dwells").shape[0] == 108
+    assert len(kept(tmp_path, dwells).table("dwells")) == 108
     assert verify(archive, keys={}).checked.findings == []
