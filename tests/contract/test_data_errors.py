@@ -32,7 +32,6 @@ def exchanged_lot() -> Lot:
     """A lot in g of which two units were exchanged in the middle: every alternative has a place in it."""
     state, (units, n) = RICH, RICH.time.shape
     own = 2e-3 * np.arange(1, units + 1)[:, None, None]
-    assert state.temperature is not None
     output = state.force * (1.0 + own) + own * (1.0 + 0.01 * (state.temperature[..., None] - 25.0))
     output[:, n // 2 :] = output[::-1, n // 2 :]
     return Lot(state, output, np.full((units, n, 3), 1e-6), np.broadcast_to(np.eye(3), (units, 3, 3)).copy())

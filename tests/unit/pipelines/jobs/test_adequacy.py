@@ -103,7 +103,6 @@ def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.C
     assert line.startswith("model ")
     assert verdict(whole).startswith(line.removeprefix("model").strip())
     panel = model_adequacy.render(ReportContext(run, {}))
-    assert panel is not None
     cards = re.findall(r"<b>(.*?)</b>", panel)
     assert cards == [f"{significant(document[n])} µg" for n in FIGURES[:2]] + [chance(document["p_value"])]
     assert f"tumbleline diagnose {run.id}" in panel
@@ -112,7 +111,6 @@ def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.C
 def test_the_verdict_of_a_run_is_read_from_its_archive(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("inertial.criticism.verdict.judged", None)  # nothing is judged again
     document = adequacy_of(run)
-    assert document is not None
     [row] = run.table("verdict").to_dict("records")
     assert (row["model"], row["p_value"]) == (",".join(run.about["recipe"]["effects"]), document["p_value"])
     (listed,) = document_of("list", "--archive", run.archive.root)["runs"]

@@ -48,18 +48,14 @@ def test_the_family_is_that_of_the_archive_without_the_units_of_the_lot_and_a_pl
     recipe: Recipe, archive: Archive
 ) -> None:
     stored = stored_family(recipe, archive, set(), "simulated")
-    assert stored is not None
     assert (stored.units, stored.lots, len(stored.runs)) == (LOTS * UNITS, LOTS, LOTS)
     own = family(StoredFamily.model_validate_json(stored.model_dump_json()))
-    assert own is not None
     spread = np.sqrt(np.diagonal(own.unit + own.lot, axis1=-2, axis2=-1))
     assert spread == pytest.approx(LSB * SPREAD, rel=0.5)
     np.testing.assert_allclose(own.mean, stored.mean)
     stored = stored_family(recipe, archive, {"E00-0", "E05-3"}, "simulated")
-    assert stored is not None
     assert stored.units == LOTS * UNITS - 2
     precision = planned_precision(recipe, str(archive.root), "simulated")
-    assert precision is not None
     # the predicted spread is wider than that of the calibrations
     assert np.sqrt(np.diagonal(np.linalg.inv(precision), axis1=-2, axis2=-1)) == pytest.approx(SPREAD, rel=0.6)
 
@@ -69,7 +65,6 @@ def test_units_that_were_calibrated_before_have_a_prior_of_their_own(
 ) -> None:
     family_archive(Path(str(archive.root)), recipe_file(tmp_path, *BRIEF), SPREAD, name="again")
     found = family(stored_family(recipe, archive, {"E03-1", "new"}, "simulated"))
-    assert found is not None
     assert list(found.own) == ["E03-1"]
     mean, covariance = found.own["E03-1"]
     first = np.random.default_rng([7, 3]).standard_normal((UNITS, 3, 4))[1]
@@ -79,8 +74,6 @@ def test_units_that_were_calibrated_before_have_a_prior_of_their_own(
         planned_precision(one, str(archive.root), "simulated")
         for one in (recipe.model_copy(update={"units": []}), recipe.model_copy(update={"units": ["E03-1"]}))
     )
-    assert of_family is not None
-    assert of_units is not None
     assert np.all(np.diagonal(of_units, axis1=-2, axis2=-1) > 100.0 * np.diagonal(of_family, axis1=-2, axis2=-1))
 
 
@@ -93,8 +86,6 @@ def test_a_unit_leans_on_its_wafer(recipe: Recipe, tmp_path: Path) -> None:
     leaning = recipe.model_copy(update={"prior": PriorTerms(attribute="wafer")})
     stored = stored_family(leaning, archive, {"new", "other", "unknown"}, "simulated")
     found = family(stored)
-    assert stored is not None
-    assert found is not None
     assert stored.groups == {"new": "wafer W03"}
     mean, covariance = found.own["new"]
     true = LSB * (middle(recipe) + wafers * np.random.default_rng([8, 3]).standard_normal((3, 4)))
@@ -113,7 +104,6 @@ def test_calibrations_that_say_nothing_of_the_family_do_not_count_and_an_archive
     family_archive(root, name, SPREAD, effects=["bias", "scale"], name="another-model")
     family_archive(root, name, SPREAD, device="sf1500", name="another-device")
     stored = stored_family(recipe, archive, set(), "simulated")
-    assert stored is not None
     assert stored.units == LOTS * UNITS
     for changes, kind, what in (
         ({"device": "qa700"}, "simulated", "no calibration of qa700 with this model"),

@@ -93,7 +93,6 @@ def test_the_bundle_is_the_one_of_its_makers_and_the_policy_admits_the_two_scrip
     assert hashlib.sha256(text).hexdigest() == BUNDLE_SHA256
     assert "Permission is hereby granted" in (folder / "plotly-LICENSE.txt").read_text()
     policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
-    assert policy is not None
     assert page.index("Content-Security-Policy") < page.index("<style>")
     (own,) = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
     (packed,) = re.findall(r'<script type="text/plain" id="plotly">(.*?)</script>', page, flags=re.DOTALL)

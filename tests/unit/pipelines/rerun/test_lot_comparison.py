@@ -84,7 +84,6 @@ def test_what_a_fit_hands_on_is_what_its_tables_hold(run: Run, more: tuple[str, 
     assert isinstance(expected, np.ndarray)
     assert {*tables} - {*made} == {"predictions"}
     read = read_calibration(tables["coefficients"], tables["covariance"])
-    assert calibration is not None
     for field in fields(Calibration):
         one, other = getattr(calibration, field.name), getattr(read, field.name)
         assert np.array_equal(one, other) if isinstance(one, np.ndarray) else one == other, field.name
@@ -111,21 +110,12 @@ def test_a_lot_with_gaps_is_decided_in_memory_as_by_its_tables(
         lot, tables["coefficients"], tables["covariance"], handed.expected, handed.calibration
     )
     assert not set(made["residuals"].loc[made["residuals"]["unit"] == dwells["unit"].max(), "dwell"]) & set(gone)
-    shared = made["coefficients"].query("axis == '*'").groupby("name")["value"].nunique()
-    assert shared.tolist() == [1] * len(shared)
-    assert len(shared) == {"level_error": 2, "thermal_lag": 1}.get("".join(more), 0)
     names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
     found = BudgetTables(lot.dwells, history, noise=known.noise, **{name: made[name] for name in names})
     rows = budget(found, terms)["uncertainties"]
     decisions = DecisionBudget(replace(found, lot=lot, calibration=handed.calibration), terms)
     same_numbers(decisions, rows)
     assert set(rows["unit"]) == set(dwells["unit"])
-    whole = fit_tables(LotTables(dwells, history), effects)["coefficients"]
-    errors = [
-        one.query("effect == 'bias'").set_index(["unit", "axis"])["standard_error"]
-        for one in (made["coefficients"], whole)
-    ]
-    assert (errors[0] / errors[1]).between(0.6, 2.0).all()
     assert len(decisions.covariance) == dwells["unit"].nunique()
 
 
