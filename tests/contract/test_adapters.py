@@ -222,15 +222,13 @@ def test_an_order_whose_answer_is_lost_is_read_back_and_not_given_again(case):
 ORDERS = ["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 
 
-def with_order(config, order):
-    devices = config.devices
-    turned = {name: getattr(devices, name).model_copy(update={"word_order": order}) for name in ("outer", "inner")}
-    return config.model_copy(update={"devices": devices.model_copy(update=turned)})
-
-
 @each(ORDERS)
 def test_a_drive_may_be_set_to_any_of_four_word_orders_and_does_not_move_in_another(order):
-    config, lot = with_order(station_with(), order), lot_of(1)
+    config, lot = station_with(), lot_of(1)
+    turned = {
+        name: getattr(config.devices, name).model_copy(update={"word_order": order}) for name in ("outer", "inner")
+    }
+    config = config.model_copy(update={"devices": config.devices.model_copy(update=turned)})
     plant = make_plant(config, lot)
     with serve_plant(config, lot, plant) as station:
         station.table.move(70.0, -30.0)

@@ -6,6 +6,7 @@ import struct
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -141,35 +142,27 @@ def mcap(path: Path) -> None:
             out.write_message("/imu", kind, dict(zip(AXES, map(float, values), strict=True)), stamp, stamp)
 
 
-def rosbag(path: Path) -> None:
-    pytest.importorskip("rosbags")
-    from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC)
-    store.register(get_types_from_msg(IMU, "own_msgs/msg/Acceleration"))
-    bag = path.with_suffix(".bag")
-    with Writer(bag) as out:
-        connection = out.add_connection("/imu", "own_msgs/msg/Acceleration", typestore=store)
+def bagged(bag: Path, package: str, distribution: str, serialize: str, **how: Any) -> Path:
+    """A bag by the library, whose names are those of its two formats."""
+    typesys, name = pytest.importorskip("rosbags.typesys"), "own_msgs/msg/Acceleration"
+    store = typesys.get_typestore(typesys.Stores[distribution])
+    store.register(typesys.get_types_from_msg(IMU, name))
+    with import_module(f"rosbags.{package}").Writer(bag, **how) as out:
+        connection = out.add_connection("/imu", name, typestore=store)
         for time, *values in frame().to_numpy():
-            own = store.types["own_msgs/msg/Acceleration"](*map(float, values))
-            out.write(connection, round(1e9 * (1e9 + time)), store.serialize_ros1(own, connection.msgtype))
-    bag.rename(path)
+            own = store.types[name](*map(float, values))
+            out.write(connection, round(1e9 * (1e9 + time)), getattr(store, serialize)(own, connection.msgtype))
+    return bag
+
+
+def rosbag(path: Path) -> None:
+    bagged(path.with_suffix(".bag"), "rosbag1", "ROS1_NOETIC", "serialize_ros1").rename(path)
 
 
 def rosbag2(path: Path) -> None:
-    pytest.importorskip("rosbags")
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS2_JAZZY)
-    store.register(get_types_from_msg(IMU, "own_msgs/msg/Acceleration"))
-    folder = path.with_suffix(".folder")
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as out:
-        connection = out.add_connection("/imu", "own_msgs/msg/Acceleration", typestore=store)
-        for time, *values in frame().to_numpy():
-            own = store.types["own_msgs/msg/Acceleration"](*map(float, values))
-            out.write(connection, round(1e9 * (1e9 + time)), store.serialize_cdr(own, connection.msgtype))
+    plugin = pytest.importorskip("rosbags.rosbag2").StoragePlugin.SQLITE3
+    how = {"version": 9, "storage_plugin": plugin}
+    folder = bagged(path.with_suffix(".folder"), "rosbag2", "ROS2_JAZZY", "serialize_cdr", **how)
     next(folder.glob("*.db3")).rename(path)
 
 
