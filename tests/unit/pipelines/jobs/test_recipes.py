@@ -113,9 +113,15 @@ def test_the_capture_is_shared_by_recipes_that_differ_in_the_model_only(tmp_path
 
 ONE = [[[1.0]]]
 PRIOR = StoredFamily(
-    effects=["bias"], runs=["one"], mean=[[0.0]], unit=ONE, lot=ONE, error=ONE, units=9, lots=3, tails=[[1.0]],
+    effects=["bias"],
+    runs=["one"],
+    mean=[[0.0]],
+    **dict.fromkeys(("unit", "lot", "error"), ONE),
+    units=9,
+    lots=3,
+    tails=[[1.0]],
     own={"A1": StoredOwn(mean=[[0.0]], covariance=ONE)},
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize(

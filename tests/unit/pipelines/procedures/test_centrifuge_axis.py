@@ -41,10 +41,8 @@ def test_figures_have_the_axis_of_the_points(
 
 
 RADIUS_M, SENSOR_M = 0.5, 0.4
-SENSOR = {
-    "kind": "centrifuge", "scale": 1.0, "radius_m": RADIUS_M, "reference_radius_m": SENSOR_M, "reference_ppm": 2500.0,
-    "reference_linearity_ppm": 100.0, "full_scale_g": 30.0,
-}  # fmt: skip
+SENSOR = {"kind": "centrifuge", "scale": 1.0, "radius_m": RADIUS_M, "full_scale_g": 30.0}
+SENSOR |= {"reference_radius_m": SENSOR_M, "reference_ppm": 2500.0, "reference_linearity_ppm": 100.0}
 
 
 def turned(stretch: float, gain: float) -> list[Taken]:

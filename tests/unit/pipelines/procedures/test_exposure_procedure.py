@@ -91,7 +91,7 @@ NARROW = load_station().limits.model_copy(update={"inner_deg": (-45.0, 200.0)})
 NA, DB = {"profile": "iec_60068_2_14_na"}, {"profile": "iec_60068_2_30_db"}
 
 
-@each([
+REFUSED = [
     (recipe_of(low_C=60.0, high_C=-10.0), {}, "exchange them"),
     (recipe_of(high_C=125.0), {}, "high_C 125 °C, -40 to 85 °C is allowed"),
     (recipe_of(temperature_C=95.0), {}, "temperature_C 95 °C, -40 to 85 °C is allowed"),
@@ -99,7 +99,10 @@ NA, DB = {"profile": "iec_60068_2_14_na"}, {"profile": "iec_60068_2_30_db"}
     (of_profile(profile="iec_60068_2_30"), {}, "no exposure profile 'iec_60068_2_30'"),
     (of_profile(**NA), {}, "low_C: missing, profile iec_60068_2_14_na has none of its own"),
     (of_profile(**DB, pressure_hPa=300.0), {}, "pressure_hPa: profile iec_60068_2_30_db has no such level"),
-])  # fmt: skip
+]
+
+
+@each(REFUSED)
 def test_temperatures_out_of_order_or_beyond_the_station_and_levels_of_no_profile_are_refused(
     row: tuple[Recipe, dict[str, Any], str],
 ) -> None:

@@ -177,12 +177,19 @@ def test_sutherlands_formula_agrees_with_the_tables_and_the_film_loses_damping_a
     assert thin < 0.4
 
 
-@each([
+REFUSED = [
     (rippled("SF1500", SF1500, frequencies_hz=[1900.0]), {}, r"frequencies_hz: 1900 Hz, 2\.5 to 1600 Hz is needed"),
     (rippled("SF1500", SF1500), BARE, "a supply that adds a sine is needed"),
     (rippled("SF1500", SF1500, rate_hz=8000.0), {}, "rate_hz 8000 Hz, at most 4000 Hz"),
-    (recipe_of(PART | {"other_temperatures_C": [120.0]}), {}, "other_temperatures_C has 120 °C, -40 to 85 °C is allowed"),
-])  # fmt: skip
+    (
+        recipe_of(PART | {"other_temperatures_C": [120.0]}),
+        {},
+        "other_temperatures_C has 120 °C, -40 to 85 °C is allowed",
+    ),
+]
+
+
+@each(REFUSED)
 def test_what_the_station_cannot_make_or_sample_is_refused(row: tuple[Recipe, dict[str, Any], str]) -> None:
     with pytest.raises(RecipeInvalid, match=row[2]):
         refuse_unusable(row[0], load_station().model_copy(update=row[1]))

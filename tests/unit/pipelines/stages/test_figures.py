@@ -27,9 +27,8 @@ def calibration(values: np.ndarray, errors: np.ndarray) -> SimpleNamespace:
     def of(effect: str, what: np.ndarray) -> np.ndarray:
         return what[None, :, None] if effect == "bias" else np.zeros((1, 3, 0))
 
-    return SimpleNamespace(
-        units=("A",), axes=(0, 1, 2), scale=np.ones((1, 3)), value=lambda e: of(e, values), standard_error=lambda e: of(e, errors)
-    )  # fmt: skip
+    known = {"units": ("A",), "axes": (0, 1, 2), "scale": np.ones((1, 3))}
+    return SimpleNamespace(**known, value=lambda e: of(e, values), standard_error=lambda e: of(e, errors))
 
 
 @pytest.mark.parametrize(("guard", "value", "error"), [(0.0, 9.0, 0.1), (2.5, 8.0, 1.0)])

@@ -65,12 +65,11 @@ def test_answers_to_the_names_of_this_machine_alone(client: AsgiClient) -> None:
 
 def test_every_change_needs_its_own_origin_and_the_token(client: AsgiClient) -> None:
     known = {"authorization": f"Bearer {TOKEN}"}
-    for status, headers in (
-        (403, {}), (403, {"origin": ORIGIN}), (403, {"origin": "http://evil.example", **known}),
-        (403, {"origin": "null", **known}), (403, {"authorization": "Bearer another"}),
-        (422, {"origin": ORIGIN, **known}), (422, known),  # let through: there is no such lot
-    ):  # fmt: skip
-        assert change(client, **headers).status_code == status, headers
+    for foreign in ({}, {"origin": ORIGIN}, {"origin": "http://evil.example", **known}, {"origin": "null", **known}):
+        assert change(client, **foreign).status_code == 403, foreign
+    assert change(client, authorization="Bearer another").status_code == 403
+    assert change(client, origin=ORIGIN, **known).status_code == 422  # let through: there is no such lot
+    assert change(client, **known).status_code == 422
     modules = [import_module(f"{routes.__name__}.{info.name}") for info in iter_modules(routes.__path__)]
     changing = [route for module in modules for route in module.router.routes if route.methods - {"GET", "HEAD"}]
     assert len(changing) >= 7
@@ -123,11 +122,10 @@ def test_a_session_is_of_one_origin_and_ends(
         return change(AsgiClient(create_app(service), f"http://{host}"), **sent).status_code
 
     assert told(settings, "127.0.0.1:8321") == 422
-    for other, host in (
-        (settings, "localhost:8321"), (settings, "127.0.0.1:8322"), (replace(settings, port=8322), "127.0.0.1:8322"),
-        (replace(settings, token=TOKEN[::-1]), "127.0.0.1:8321"),
-    ):  # fmt: skip
-        assert told(other, host) == 403
+    assert told(settings, "localhost:8321") == 403
+    assert told(settings, "127.0.0.1:8322") == 403
+    assert told(replace(settings, port=8322), "127.0.0.1:8322") == 403
+    assert told(replace(settings, token=TOKEN[::-1]), "127.0.0.1:8321") == 403
     end, rest = cookie.partition(".")[::2]
     forged = f"{int(end) + 1}.{rest}"
     assert change(client, **own | {"cookie": f"{settings.cookie}={forged}"}).status_code == 403
