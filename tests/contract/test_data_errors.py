@@ -87,9 +87,10 @@ def test_an_error_of_handling_is_whole_in_its_file(name: str) -> None:
 
 
 def test_an_error_of_handling_that_is_half_there_is_told_with_what_it_lacks() -> None:
-    half, lot = ModuleType(__name__), exchanged_lot()
+    half, lot = ModuleType("half"), exchanged_lot()
     assert lacks_as_handling(half, lot) == ["one class with an id, 0 are there"]
     own = dict.fromkeys(("symbol", "equation", "__doc__"), "") | {"id": "bias", "hides_behind": ("nothing",)}
+    own["__module__"] = half.__name__
     half.Half = type("Half", (Handling,), own)
     assert lacks_as_handling(half, lot) == ["change", "describe", "locations"]
     half.Half = type("Half", (import_module(f"{handling.__name__}.gain_step").GainStep,), own)

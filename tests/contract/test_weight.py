@@ -1,6 +1,5 @@
 """What a user installs: no more packages than are needed, none that the code does not find, no licence that is not told."""
 
-import ast
 import re
 import sys
 import tomllib
@@ -19,9 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ("inertial", "schemas", "stations", "pipelines", "tumbleline")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 MOST_PACKAGES, MOST_MB = 110, 650.0
-SELF = re.compile(r"^tumbleline\[([\w,]+)\]$")
-
-
 packages = cache(metadata.packages_distributions)
 
 
@@ -35,55 +31,29 @@ def modules_of(distributions: set[str]) -> set[str]:
 def names(requirements: list[str]) -> set[str]:
     """Distributions of a list of requirements, with those of extras of this product."""
     found: set[str] = set()
-    for text in requirements:
-        own = SELF.match(text)
-        extras = own[1].split(",") if own else []
-        found |= {name for extra in extras for name in names(PROJECT["optional-dependencies"][extra])}
-        found |= set() if own else {canonicalize_name(Requirement(text).name)}
+    for one in map(Requirement, requirements):
+        if one.name == PROJECT["name"]:
+            found |= {name for extra in one.extras for name in names(PROJECT["optional-dependencies"][extra])}
+        else:
+            found.add(canonicalize_name(one.name))
     return found
 
 
-EXTRAS = {
-    name
-    for extra, requirements in PROJECT["optional-dependencies"].items()
-    if extra not in {"build", "dev", "bench", "docs"}
-    for name in names(requirements)
-}
-
-
-def imports(path: Path) -> dict[str, set[str]]:
-    """Top-level names of the modules that a file imports: at its top, inside functions, and for type checkers only."""
-    found: dict[str, set[str]] = {"top": set(), "inside": set(), "types": set()}
-
-    def walk(node: ast.AST, where: str) -> None:
-        if isinstance(node, ast.Import):
-            found[where] |= {one.name.partition(".")[0] for one in node.names}
-        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
-            found[where].add(node.module.partition(".")[0])
-        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-            for one in node.body:
-                walk(one, "types")
-            for one in node.orelse:
-                walk(one, where)
-            return
-        inner = "inside" if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and where == "top" else where
-        for one in ast.iter_child_nodes(node):
-            if isinstance(one, ast.stmt | ast.excepthandler | ast.match_case):  # no expression holds an import
-                walk(one, inner)
-
-    walk(ast.parse(path.read_text(encoding="utf-8")), "top")
-    return found
+FOR_USERS = PROJECT["optional-dependencies"].keys() - {"build", "dev", "bench", "docs"}
+EXTRAS = names([f"{PROJECT['name']}[{','.join(FOR_USERS)}]"])
+IMPORT = re.compile(r"^( *)(?:from(?= [\w.]+ import )|import(?= [\w.]+(?: as \w+)?$)) (\w+)", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
 def imported() -> dict[Path, dict[str, set[str]]]:
-    """The imports of every module that is shipped, of other distributions only."""
+    """The imports of every module that is shipped, of other distributions only: at its top, and inside functions and blocks."""
     own = set(sys.stdlib_module_names) | set(SHIPPED)
-    return {
-        path.relative_to(ROOT): {where: modules - own for where, modules in imports(path).items()}
-        for top in SHIPPED
-        for path in sorted((ROOT / top).rglob("*.py"))
-    }
+    found: dict[Path, dict[str, set[str]]] = {}
+    for path in sorted(path for top in SHIPPED for path in (ROOT / top).rglob("*.py")):
+        found[path.relative_to(ROOT)] = {"top": set(), "inside": set()}
+        for indented, module in IMPORT.findall(path.read_text(encoding="utf-8")):
+            found[path.relative_to(ROOT)]["inside" if indented else "top"] |= {module} - own
+    return found
 
 
 def beyond(imported: dict[Path, dict[str, set[str]]], where: str, there: set[str]) -> dict[str, list[str]]:

@@ -112,15 +112,9 @@ def test_the_capture_is_shared_by_recipes_that_differ_in_the_model_only(tmp_path
 
 
 ONE = [[[1.0]]]
+OWN = {"A1": StoredOwn(mean=[[0.0]], covariance=ONE)}
 PRIOR = StoredFamily(
-    effects=["bias"],
-    runs=["one"],
-    mean=[[0.0]],
-    **dict.fromkeys(("unit", "lot", "error"), ONE),
-    units=9,
-    lots=3,
-    tails=[[1.0]],
-    own={"A1": StoredOwn(mean=[[0.0]], covariance=ONE)},
+    effects=["bias"], runs=["a"], mean=[[0.0]], unit=ONE, lot=ONE, error=ONE, units=9, lots=3, tails=ONE[0], own=OWN
 )
 
 

@@ -10,7 +10,6 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from capture_double import small_run
 
 from pipelines.archive import Archive, Run
 from pipelines.jobs.model_change import ModelChange
@@ -30,11 +29,6 @@ from schemas.validity import Stability
 
 READ = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise")
 STABLE = {"horizon_days": 4000.0, "switch_on_ug": 7.0, "source": "data_sheet"}
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return small_run(tmp_path_factory.mktemp("decisions"))
 
 
 @pytest.fixture(scope="module", params=["without stability", "with stability"])

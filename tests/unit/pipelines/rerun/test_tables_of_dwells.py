@@ -44,9 +44,11 @@ def directions() -> Array:
     return np.tile(np.concatenate([faces, np.array(edges) / np.sqrt(2.0)]), (2, 1))
 
 
-def table(rng: np.random.Generator, root: Array | None = None, units: str = "ABC") -> pd.DataFrame:
+def table(
+    rng: np.random.Generator, root: Array | None = None, units: str = "ABC", force: Array | None = None
+) -> pd.DataFrame:
     """A lot in the exchange format without sd and n, with noise of covariance ``root`` (n, n) times its transpose, g²."""
-    force = directions()
+    force = directions() if force is None else force
     n = len(force)
     root = SPREAD_G * np.eye(n) if root is None else root
     made: list[pd.DataFrame] = []
@@ -85,10 +87,7 @@ def test_errors_are_as_large_as_the_residuals_say_where_no_samples_tell_the_nois
         "flicker": 0.2 * white + flicker_kernel(time),
         "walk": white + 4.0 * walk_kernel(time, np.ones(n, dtype=bool)),
     }
-    roots: dict[str, Array] = {
-        name: np.asarray(SPREAD_G * np.linalg.cholesky(covariance), dtype=np.float64)
-        for name, covariance in noises.items()
-    }
+    roots = {name: SPREAD_G * np.linalg.cholesky(covariance) for name, covariance in noises.items()}
     found = {name: errors_over_uncertainties(root, 20 + k, "scale") for k, (name, root) in enumerate(roots.items())}
     found["bias"] = errors_over_uncertainties(roots["white"], 9, "bias")
     inside = {name: float(np.mean(np.abs(ratios) < 2.0)) for name, ratios in found.items()}
@@ -152,12 +151,10 @@ def test_units_of_a_lot_with_gaps_are_fitted_on_what_they_have() -> None:
         for name in ("coefficients", "covariance", "residuals", "wander"):
             own = made[name][made[name]["unit"].isin(units)].reset_index(drop=True)
             pd.testing.assert_frame_equal(own, alone[name])
-    checked = verified(gap, None, *(made[name] for name in ("coefficients", "covariance", "predictions")))[
-        "verification"
-    ]
+    tables = (made[name] for name in ("coefficients", "covariance", "predictions"))
+    checked = verified(gap, None, *tables)["verification"]
     assert checked.groupby("unit")["dwell"].agg(list).to_dict() == {"A": [3, 9], "B": [3, 9], "C": [9]}
-    errors = checked["error_ug"].abs() / checked["uncertainty_ug"]
-    assert errors.max() < 4.0
+    assert (checked["error_ug"].abs() / checked["uncertainty_ug"]).max() < 4.0
 
 
 def test_values_that_all_units_share_are_fitted_where_units_lack_dwells() -> None:
@@ -165,17 +162,10 @@ def test_values_that_all_units_share_are_fitted_where_units_lack_dwells() -> Non
     rng = np.random.default_rng(6)
     outer, inner = rng.uniform(-180.0, 180.0, (2, 40))
     force = force_from_angles(np.radians(outer) + 2e-4, np.radians(inner))
-    angles = {"time_s": 40.0 * np.arange(40), "unit_C": 25.0, "outer_deg": outer, "inner_deg": inner}
-    made: list[pd.DataFrame] = []
-    for unit in "ABCD":
-        out = GAIN * force + BIAS_G + SPREAD_G * rng.normal(size=force.shape)
-        outputs = {f"out_{axis}": out[:, k] for k, axis in enumerate("xyz")}
-        made.append(pd.DataFrame({"unit": unit, "dwell": range(40), **angles, **outputs}))
-    dwells = complete_table(pd.concat(made, ignore_index=True))[0]
+    made = table(rng, units="ABCD", force=force).drop(columns=["force_x", "force_y", "force_z"])
+    dwells = complete_table(made.assign(outer_deg=np.tile(outer, 4), inner_deg=np.tile(inner, 4)))[0]
     model = (*PLAIN, "outer_encoder_offset")
-    lacks = (dwells["unit"] == "C") & dwells["dwell"].isin([4, 11, 20]) | (dwells["unit"] == "A") & (
-        dwells["dwell"] == 7
-    )
+    lacks = (dwells["unit"] + dwells["dwell"].astype(str)).isin(["C4", "C11", "C20", "A7"])
     whole, found = (fit(one, None, model)["coefficients"] for one in (dwells, dwells[~lacks]))
     offset = found.query("effect == 'outer_encoder_offset'")
     np.testing.assert_allclose(np.linalg.norm(dwells[["force_x", "force_y", "force_z"]], axis=1), 1.0)  # at the angles

@@ -17,9 +17,9 @@ from urllib.parse import quote, unquote
 import httpx
 import pytest
 from asgi_client import AsgiClient
-from capture_double import small_run
 from each import each
 
+from pipelines.archive import Run
 from pipelines.workbench import routes
 from pipelines.workbench.application import create_app
 from pipelines.workbench.routes.static_files import PLOTLY, PLOTLY_SHA256
@@ -33,16 +33,9 @@ TO_DO = "reload the page|correct it"
 SCRIPT = "<img src=x onerror=alert(1)><script>alert(2)</script>"
 
 
-@pytest.fixture(scope="module")
-def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("guard")
-    small_run(folder)
-    return folder / "archive"
-
-
 @pytest.fixture
-def settings(archive: Path, tmp_path: Path) -> WorkbenchSettings:
-    return WorkbenchSettings(archive=str(archive), folder=tmp_path / "bench", token=TOKEN)
+def settings(run: Run, tmp_path: Path) -> WorkbenchSettings:
+    return WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
 
 
 @pytest.fixture
@@ -200,16 +193,13 @@ def raw(settings: WorkbenchSettings, path: str, query: str = "", http: str = "1.
     return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=body)
 
 
-def test_from_another_machine_nothing_is_read_without_the_token(archive: Path, tmp_path: Path) -> None:
-    far = WorkbenchSettings(
-        archive=str(archive), folder=tmp_path, host="0.0.0.0", names=("bench.example",), token=TOKEN, proxied=True
-    )
+def test_from_another_machine_nothing_is_read_without_the_token(settings: WorkbenchSettings) -> None:
+    far = replace(settings, host="0.0.0.0", names=("bench.example",), proxied=True)
     client = AsgiClient(create_app(far), "https://bench.example")
-    assert client.get("/units").status_code == 403
-    assert client.get(f"/units?token={TOKEN}").status_code == 303
-    assert client.get("/units").status_code == 200
+    for address, status in (("/units", 403), (f"/units?token={TOKEN}", 303), ("/units", 200)):
+        assert client.get(address).status_code == status, address
     with pytest.raises(WrongUse, match="encryption"):
-        create_app(WorkbenchSettings(archive=str(archive), folder=tmp_path, host="0.0.0.0"))
+        create_app(replace(settings, host="0.0.0.0"))
 
 
 def test_pages_carry_a_policy_that_runs_no_script_but_our_files(client: AsgiClient) -> None:
