@@ -10,7 +10,6 @@ from small_station import lot_of
 
 from schemas.errors import LinkLost, OperatorNeeded, RecipeInvalid, StationRefused, StationTimeout
 from stations.devices.adapters import adapter_of
-from stations.devices.chamber import ThermalChamber
 from stations.devices.table import TableAxis
 from stations.opening import make_plant, serve_plant
 from stations.profile_files import load_profile, profile_names
@@ -26,12 +25,6 @@ def opened(axis: str = "oriental_az", chamber: str = "watlow_f4t"):
     plant = make_plant(config, lot)
     with serve_plant(config, lot, plant) as station:
         yield station, plant
-
-
-def test_the_drives_and_chambers_of_the_catalogue_are_there():
-    assert {"oriental_az", "smc_lecp6", "iai_robo_cylinder"} <= set(DRIVES)
-    chambers = {"watlow_f4t", "watlow_f4s", "binder_mb1", "binder_mb2", "eurotherm_3200", "espec_p300"}
-    assert chambers <= set(CONTROLLERS)
 
 
 @each([name for name in profile_names() if load_profile(name).maker != "Tumbleline"])
@@ -108,33 +101,25 @@ def test_a_chamber_gets_where_it_is_told_refuses_what_is_not_allowed_and_switche
         assert plant.fixture.chamber.running
 
 
-def test_a_controller_set_up_for_less_refuses_before_anything_is_written():
-    with opened() as (station, plant):
-        bank = plant.banks[3]
-        bank._sources["set_point_low"] = lambda: -10.0
-        with pytest.raises(StationRefused, match="the controller allows -10 to 180 °C"):
-            station.chamber.set_temperature(-20.0)
-        assert plant.fixture.chamber.set_point == 23.0
-
-
 STATES = [
     ("watlow_f4t", "program_state", "runs", OperatorNeeded, "program is in state runs"),
     ("watlow_f4t", "alarm_1", 99, OperatorNeeded, "alarm 1 in state unknown"),
     ("watlow_f4s", "status", "program_holds", OperatorNeeded, "program is in state program_holds"),
     ("binder_mb1", "mode", "program", OperatorNeeded, "program is in state runs"),
     ("eurotherm_3200", "program_status", "runs", OperatorNeeded, "program is in state runs"),
+    ("watlow_f4t", "set_point_low", -10.0, StationRefused, "the controller allows -10 to 180 °C"),
     *((name, "temperature_unit", "fahrenheit", StationRefused, "shows fahrenheit, celsius is needed")
       for name in ("watlow_f4t", "watlow_f4s")),
 ]  # fmt: skip
 
 
 @each(STATES)
-def test_a_program_an_alarm_or_another_unit_of_the_controller_is_refused(case):
+def test_a_program_an_alarm_another_unit_or_narrower_limits_of_the_controller_are_refused(case):
     name, register, state, error, told = case
     with opened(chamber=name) as (station, plant):
         plant.banks[3]._sources[register] = lambda: state
         with pytest.raises(error, match=told):
-            station.chamber.set_temperature(40.0)
+            station.chamber.set_temperature(-20.0)
         assert plant.fixture.chamber.set_point == 23.0
 
 
@@ -186,9 +171,7 @@ class Recorder:
 def test_nothing_ever_writes_the_set_points_of_an_eurotherm_that_wear_its_memory():
     profile = load_profile("eurotherm_3200")
     wearing = {2, 24, 25, *(0x8000 + 2 * n + i for n in (2, 24, 25) for i in (0, 1))}
-    writable = {a for r in profile.registers if r.writable for a in range(r.address, r.end)}
-    assert not writable & wearing
-    assert writable == {276, 0x8034, 0x8035}
+    assert not wearing & {a for r in profile.registers if r.writable for a in range(r.address, r.end)}
     with opened(chamber="eurotherm_3200") as (station, plant):
         values = station.chamber._values
         values._link = recorder = Recorder(values._link)
@@ -210,11 +193,8 @@ def test_an_iai_drive_has_its_band_before_its_target_and_an_smc_drive_its_start_
             station.table.move(20.0, 0.0)
         written[name] = recorder.written
     assert [at for space, at, _ in written["iai_robo_cylinder"] if space == "holding"] == [0x9902, 0x9900] * 2
-    assert [w for w in written["smc_lecp6"] if w[0] == "holding"] == [
-        ("holding", 0x9102, 16),
-        ("holding", 0x9100, 1),
-    ] * 2
-    assert [w for w in written["smc_lecp6"] if w[0] == "coil"] == [("coil", 0x30, 1), ("coil", 0x19, 1)]
+    assert [w[1:] for w in written["smc_lecp6"] if w[0] == "holding"] == [(0x9102, 16), (0x9100, 1)] * 2
+    assert [w[1:] for w in written["smc_lecp6"] if w[0] == "coil"] == [(0x30, 1), (0x19, 1)]
 
 
 STARTS = {"oriental_az": 0x58, "smc_lecp6": 0x9100, "iai_robo_cylinder": 0x9900, "universal_robots": 131}
@@ -242,15 +222,13 @@ def test_an_order_whose_answer_is_lost_is_read_back_and_not_given_again(case):
 ORDERS = ["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 
 
-def with_order(config, order):
-    devices = config.devices
-    turned = {name: getattr(devices, name).model_copy(update={"word_order": order}) for name in ("outer", "inner")}
-    return config.model_copy(update={"devices": devices.model_copy(update=turned)})
-
-
 @each(ORDERS)
 def test_a_drive_may_be_set_to_any_of_four_word_orders_and_does_not_move_in_another(order):
-    config, lot = with_order(station_with(), order), lot_of(1)
+    config, lot = station_with(), lot_of(1)
+    turned = {
+        name: getattr(config.devices, name).model_copy(update={"word_order": order}) for name in ("outer", "inner")
+    }
+    config = config.model_copy(update={"devices": config.devices.model_copy(update=turned)})
     plant = make_plant(config, lot)
     with serve_plant(config, lot, plant) as station:
         station.table.move(70.0, -30.0)
@@ -262,16 +240,11 @@ def test_a_drive_may_be_set_to_any_of_four_word_orders_and_does_not_move_in_anot
         assert plant.outer.move.target == 0.0
 
 
-def test_a_profile_without_what_its_adapter_needs_is_refused_by_name():
+def test_a_profile_without_what_its_adapter_needs_or_on_a_link_of_another_kind_is_refused_by_name():
     profile = load_profile("oriental_az")
     kept = [register for register in profile.registers if register.name != "alarm"]
     with pytest.raises(RecipeInvalid, match="alarm missing"):
         adapter_of(profile.model_copy(update={"registers": kept}), "axis", TableAxis)
-    with pytest.raises(RecipeInvalid, match="drives no chamber"):
-        adapter_of(profile, "chamber", ThermalChamber)
-
-
-def test_a_device_carried_by_something_it_does_not_have_is_refused():
     config = station_with(chamber="espec_p300")
     chamber = config.devices.chamber.model_copy(update={"link": "tcp"})
     config = config.model_copy(update={"devices": config.devices.model_copy(update={"chamber": chamber})})

@@ -9,18 +9,16 @@ from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 
-import pytest
 from each import each
 from typer.core import TyperCommand
 from typer.main import get_command
 from typer.testing import CliRunner
 
-from pipelines.cli import COMMANDS, IncompleteCommand, app, find_commands
+from pipelines.cli import COMMANDS, app
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 NAMED = set(re.findall(r"tumbleline +([a-z]+)", "\n".join(page.read_text(encoding="utf-8") for page in PAGES)))
-WHOLE = 'PART = "Results"\nORDER = 310\nSUMMARY = "Do it."\n\n\ndef command(\n) -> None: ...\n'
 
 
 def leaves(command: object) -> Iterator[TyperCommand]:
@@ -58,31 +56,17 @@ def test_a_command_is_in_the_help_and_the_documents_and_explains_itself_and_ever
 
 
 @each(COMMANDS)
-def test_the_help_of_a_command_shows_two_examples_with_options_that_exist(name: str) -> None:
-    examples = import_module(f"pipelines.cli.{COMMANDS[name].module}").EXAMPLES
-    assert len(set(examples)) == 2
-    text = help_of(160, name)
-    for example in examples:
-        assert example in text
-        words = shlex.split(example)
-        assert words[:2] == ["tumbleline", name]
-        command, rest = meant(get_command(app).get_command(None, name)._load(), words[2:])
-        options = {option: p for p in command.params for option in (*p.opts, *p.secondary_opts)}
-        assert {word for word in rest if word.startswith("--")} <= set(options)
-        command.make_context(name, rest)  # parses: every argument and value is of its kind
-
-
-@each(COMMANDS)
-def test_the_help_of_a_subcommand_shows_two_examples_of_its_own(name: str) -> None:
+def test_the_help_of_a_command_and_of_a_subcommand_shows_two_examples_with_options_that_exist(name: str) -> None:
     group = get_command(app).get_command(None, name)._load()
-    for own, leaf in getattr(group, "commands", {}).items():
-        text = help_of(160, name, own)
-        examples = re.findall(rf"^ *(tumbleline {name}\b.*?) *$", text.split("Examples:")[1], re.MULTILINE)
-        assert len(set(examples)) == 2, own
+    below = getattr(group, "commands", {})
+    for words in [(name,), *((name, own) for own in below)]:
+        text = help_of(160, *words).split("Examples:")[1]
+        examples = re.findall(rf"^ *(tumbleline {name}\b.*?) *$", text, re.MULTILINE)
+        assert len(set(examples)) == 2, words
         for example in examples:
             command, rest = meant(group, shlex.split(example)[2:])
-            assert command is leaf, example
-            command.make_context(own, rest)
+            assert len(words) == 1 or command is below[words[1]], example
+            command.make_context(name, rest)  # parses: every option, argument and value is of its kind
 
 
 def test_help_needs_eighty_columns_breaks_no_option_and_its_parts_stand_together() -> None:
@@ -111,30 +95,3 @@ def meant(command: object, rest: list[str]) -> tuple[TyperCommand, list[str]]:
     if rest and rest[0] in below:
         return below[rest[0]], rest[1:]
     return below[command.usual], rest
-
-
-def test_one_file_is_a_command(tmp_path: Path) -> None:
-    (tmp_path / "lambda_.py").write_text(WHOLE, encoding="utf-8")
-    (tmp_path / "helpers.py").write_text("def helper() -> None: ...\n", encoding="utf-8")
-    assert {name: tuple(c) for name, c in find_commands(tmp_path).items()} == {
-        "lambda": ("lambda_", "Results", 310, "Do it.")
-    }
-
-
-HALF = {
-    "PART": 'PART = "Results"\n',
-    "ORDER": "ORDER = 310\n",
-    "SUMMARY": 'SUMMARY = "Do it."\n',
-    "a function 'command'": "def command(\n) -> None: ...\n",
-}
-
-
-@each(HALF)
-def test_a_command_that_is_half_there_or_in_the_place_of_another_is_refused(missing: str, tmp_path: Path) -> None:
-    (tmp_path / "half.py").write_text(WHOLE.replace(HALF[missing], ""), encoding="utf-8")
-    with pytest.raises(IncompleteCommand, match=rf"half\.py: a command without {missing}"):
-        find_commands(tmp_path)
-    for name in ("half", "two"):
-        (tmp_path / f"{name}.py").write_text(WHOLE, encoding="utf-8")
-    with pytest.raises(IncompleteCommand, match=r"two\.py: ORDER is 310, as in half\.py"):
-        find_commands(tmp_path)

@@ -32,7 +32,6 @@ def exchanged_lot() -> Lot:
     """A lot in g of which two units were exchanged in the middle: every alternative has a place in it."""
     state, (units, n) = RICH, RICH.time.shape
     own = 2e-3 * np.arange(1, units + 1)[:, None, None]
-    assert state.temperature is not None
     output = state.force * (1.0 + own) + own * (1.0 + 0.01 * (state.temperature[..., None] - 25.0))
     output[:, n // 2 :] = output[::-1, n // 2 :]
     return Lot(state, output, np.full((units, n, 3), 1e-6), np.broadcast_to(np.eye(3), (units, 3, 3)).copy())
@@ -75,9 +74,8 @@ def _lacks_in_a_lot(error: Handling, lot: Lot) -> list[str]:
         of_each = error.of_each_unit(lot, slope, **alike)
         lacks += [] if of_each.shape[-1] == change.shape[-1] else ["of_each_unit with as many columns"]
     lacks += [] if len(error.describe(lot, size, **location)) > 20 else ["a description"]
-    lacks += (
-        [] if all(set(near) == set(location) for near in error.near(lot, **location)) else ["locations near a location"]
-    )
+    near = error.near(lot, **location)
+    lacks += [] if all(set(one) == set(location) for one in near) else ["locations near a location"]
     lacks += [] if set(error.units(**location)) <= set(range(units)) else ["units of the lot"]
     lacks += [] if set(error.dwells(lot, **location)) <= set(range(n)) else ["dwells of the lot"]
     return lacks
@@ -89,15 +87,13 @@ def test_an_error_of_handling_is_whole_in_its_file(name: str) -> None:
 
 
 def test_an_error_of_handling_that_is_half_there_is_told_with_what_it_lacks() -> None:
-    half = ModuleType("half")
-    lot = exchanged_lot()
+    half, lot = ModuleType("half"), exchanged_lot()
     assert lacks_as_handling(half, lot) == ["one class with an id, 0 are there"]
-    source = "class Half(Handling):\n    id = 'bias'\n    symbol = equation = ''\n    hides_behind = ('nothing',)"
-    exec(source, vars(half) | {"Handling": Handling, "__name__": "half"}, vars(half))
-    half.Half.__module__ = "half"
+    own = dict.fromkeys(("symbol", "equation", "__doc__"), "") | {"id": "bias", "hides_behind": ("nothing",)}
+    own["__module__"] = half.__name__
+    half.Half = type("Half", (Handling,), own)
     assert lacks_as_handling(half, lot) == ["change", "describe", "locations"]
-    whole = import_module(f"{handling.__name__}.gain_step").GainStep
-    half.Half = type("Half", (whole,), {**vars(half.Half), "__module__": "half", "__doc__": ""})
+    half.Half = type("Half", (import_module(f"{handling.__name__}.gain_step").GainStep,), own)
     assert lacks_as_handling(half, lot) == [
         "symbol", "equation", "a docstring that says what it is", "an id of its own", "an effect 'nothing'",
     ]  # fmt: skip
@@ -121,73 +117,56 @@ def test_every_file_takes_part_and_nothing_else_names_one() -> None:
 
 
 Table = pd.DataFrame
-Rows = np.ndarray
-Spoil = Callable[[Table, Rows], Table]
+Spoil = Callable[[Table, np.ndarray], Table]
 
 
-def scaled(columns: list[str], factor: float, dwells: slice | list[int] = slice(None)) -> Spoil:
-    """Multiplies columns of a unit in some dwells."""
-    return lambda table, rows: _set(table, rows[dwells], columns, table.loc[rows[dwells], columns] * factor)
+def changed(columns: list[str], change: Callable[[Table], object], dwells: slice | list[int] = slice(None)) -> Spoil:
+    """Changes columns of a unit in some dwells."""
 
+    def work(table: Table, rows: np.ndarray) -> Table:
+        table.loc[rows[dwells], columns] = change(table.loc[rows[dwells], columns])
+        return table
 
-def added(columns: list[str], value: float, dwells: slice | list[int] = slice(None)) -> Spoil:
-    """Adds a value to columns of a unit in some dwells."""
-    return lambda table, rows: _set(table, rows[dwells], columns, table.loc[rows[dwells], columns] + value)
-
-
-def frozen(columns: list[str], dwells: slice) -> Spoil:
-    """Repeats the first of some dwells."""
-    return lambda table, rows: _set(table, rows[dwells], columns, table.loc[rows[dwells][0], columns].to_numpy(float))
+    return work
 
 
 def exchanged(one: list[int], other: list[int], unit: str = "U000") -> Spoil:
     """Exchanges outputs of dwells with others of a unit."""
 
-    def work(table: Table, rows: Rows) -> Table:
+    def work(table: Table, rows: np.ndarray) -> Table:
         here, there = rows[one], table.index[table["unit"] == unit].to_numpy()[other]
-        outputs = table.loc[here, OUT].to_numpy()
-        return _set(_set(table, here, OUT, table.loc[there, OUT].to_numpy()), there, OUT, outputs)
+        table.loc[[*here, *there], OUT] = table.loc[[*there, *here], OUT].to_numpy()
+        return table
 
     return work
 
 
-def without(dwells: slice) -> Spoil:
-    """Drops dwells of a unit."""
-    return lambda table, rows: table.drop(index=rows[dwells])
+def first(values: Table) -> np.ndarray:
+    return values.iloc[0].to_numpy(float)
 
 
-def _set(table: Table, rows: Rows, columns: list[str], values: object) -> Table:
-    table.loc[rows, columns] = values
-    return table
-
-
-def far_off(table: Table, rows: Rows) -> Table:
+def far_off(table: Table, rows: np.ndarray) -> Table:
     """Two dwells far off on an axis, in a file without scatter."""
     table.loc[rows[[5, 40]], "out_x"] += 0.3
     return table.drop(columns=SPREAD)
 
 
-def coarse(table: Table, rows: Rows) -> Table:
-    """Outputs in steps of 0.2 mg."""
-    return _set(table, rows, OUT, np.round(table.loc[rows, OUT].to_numpy() / 2e-4) * 2e-4)
-
-
 SPOILT: dict[str, Spoil] = {
-    "truncated_file": without(slice(50, None)),
-    "clock_jitter": added(["time_s"], -2000.0, slice(30, None)),
-    "temperature_unit": added(["unit_C"], 273.15),
-    "stuck_output": frozen(OUT, slice(20, 30)),
-    "changed_calibration": scaled([*OUT, *SPREAD], 2.0, slice(30, None)),
-    "dead_channel": scaled(["out_z"], 1e-3),
-    "scale_of_lot": scaled([*OUT, *SPREAD], 9.80665),
-    "axis_flip": scaled(["out_y"], -1.0),
+    "truncated_file": lambda table, rows: table.drop(index=rows[50:]),
+    "clock_jitter": changed(["time_s"], lambda t: t - 2000.0, slice(30, None)),
+    "temperature_unit": changed(["unit_C"], lambda t: t + 273.15),
+    "stuck_output": changed(OUT, first, slice(20, 30)),
+    "changed_calibration": changed([*OUT, *SPREAD], lambda v: 2.0 * v, slice(30, None)),
+    "dead_channel": changed(["out_z"], lambda v: 1e-3 * v),
+    "scale_of_lot": changed([*OUT, *SPREAD], lambda v: 9.80665 * v),
+    "axis_flip": changed(["out_y"], lambda v: -v),
     "swapped_units": exchanged([4, 15, 21, 33, 48, 60], [4, 15, 21, 33, 48, 60], "U002"),
-    "wrong_pose": exchanged([3, 10], [10, 3]),
-    "loud_dwells": scaled(["sd_x"], 40.0, [5, 6, 40]),
+    "wrong_pose": exchanged([3], [10]),
+    "loud_dwells": changed(["sd_x"], lambda v: 40.0 * v, [5, 6, 40]),
     "outlying_dwells": far_off,
-    "stale_temperature": frozen(["unit_C"], slice(20, None)),
-    "quantised": coarse,
-    "dropped_samples": scaled(["n"], 0.5, slice(10, 20)),
+    "stale_temperature": changed(["unit_C"], first, slice(20, None)),
+    "quantised": changed(OUT, lambda v: np.round(v / 2e-4) * 2e-4),
+    "dropped_samples": changed(["n"], lambda v: v // 2, slice(10, 20)),
 }
 """How a lot is spoilt in which the test of each file finds its fault."""
 

@@ -23,34 +23,7 @@ from stations.profile_files import load_profile, profile_names
 
 ROOT = Path(__file__).resolve().parents[2]
 OF_FAMILIES = [name for name in profile_names() if load_profile(name).kind in {"axis", "chamber"}]
-PROFILE = """\
-name = "{name}"
-kind = "chamber"
-adapter = "{family}"
-maker = "Acme"
-model = "C1"
-verified = false
-source = "manual C1-7, table 3"
-
-[[registers]]
-name = "temperature"
-address = 4100
-manual = "40 4101"
-type = "float32"
-unit = "degC"
-
-[[registers]]
-name = "set_point"
-address = 4200
-manual = "40 4201"
-type = "int16"
-scale = 0.1
-unit = "degC"
-minimum = -40.0
-maximum = 150.0
-access = "read_write"
-{more}
-"""
+EXAMPLE = (ROOT / "stations" / "profiles" / "watlow_ez_zone.toml").read_text(encoding="utf-8")
 ADAPTER = """\
 from stations.devices.chamber import AUTOMATIC, ThermalChamber
 
@@ -122,12 +95,8 @@ def chamber_reaches(profile: str, goal: float) -> float:
 @each(OF_FAMILIES)
 def test_every_profile_has_its_adapter_its_simulated_device_and_its_entry_in_the_reference(name):
     profile = load_profile(name)
-    if profile.kind == "axis":
-        assert adapter_of(profile, "axis", TableAxis)
-        config = station_with(axis=name)
-    else:
-        assert adapter_of(profile, "chamber", ThermalChamber)
-        config = station_with(chamber=name)
+    assert adapter_of(profile, profile.kind, {"axis": TableAxis, "chamber": ThermalChamber}[profile.kind])
+    config = station_with(**{profile.kind: name})
     plant = make_plant(config, lot_of(1))  # refuses a register without a value of the world behind it
     served = [bank.profile.name for bank in plant.banks.values()]
     assert name in served or (profile.commands and plant.line_devices)
@@ -152,7 +121,8 @@ def test_every_family_has_an_adapter_a_simulation_and_a_profile_and_no_other_mod
 def added(product, family, more="", adapter="", simulation=""):
     """A device of a family added to the product, with modules for a new family."""
     profiles, devices, simulations = product
-    (profiles / "acme.toml").write_text(PROFILE.format(name="acme", family=family, more=more), "utf-8")
+    text = EXAMPLE.replace('"watlow_ez_zone"', '"acme"').replace('adapter = "set_point"', f'adapter = "{family}"')
+    (profiles / "acme.toml").write_text(text + more, "utf-8")
     for folder, text in ((devices, adapter), (simulations, simulation)):
         if text:
             (folder / "acme.py").write_text(text, "utf-8")

@@ -47,7 +47,6 @@ def written(name: str, units: list[UnitCalibration]) -> dict[str, bytes]:
 def test_a_format_is_documented_names_every_unit_ends_its_last_line_and_drops_no_effect_silently(name: str) -> None:
     shown = " ".join(CliRunner().invoke(app, ["export", "--help"], env={"COLUMNS": "160"}).stdout.split())
     own = FORMATS[name].__doc__
-    assert own is not None
     assert f"{name}: {own.partition(': ')[2].partition('.')[0].replace('``', '')[:60]}" in shown
     assert f"`{name}`" in GUIDE.read_text(encoding="utf-8")
     files = written(name, [calibration("SN1"), calibration("SN2")])

@@ -46,13 +46,6 @@ def test_no_file_names_an_index_or_a_path_of_a_machine() -> None:
                 line = text[: hit.start()].count("\n") + 1
                 mentions.append(f"{path.relative_to(ROOT)}:{line}: {hit[0]!r}")
     assert mentions == []
-    slash, dot = "/", "."  # the patterns find what they are for
-    for text in (f"see {slash}work/x", f"'{slash}tmp/x'", f"{slash}root/.venv"):
-        assert MACHINE.search(text)
-    for text in (f"https://pypi{dot}org/simple", f"files{dot}pythonhosted{dot}org", "--index-" + "url https://a"):
-        assert INDEX.search(text)
-    assert not MACHINE.search("docs/work/x")
-    assert not INDEX.search("uv pip compile --no-emit-index-url --no-annotate")
 
 
 def anchors(path: Path) -> set[str]:

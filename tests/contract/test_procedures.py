@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from each import each
-from made_package import made_package
 from scipy import signal
 from stopped_capture import Stopped, Stopping
 
@@ -17,19 +16,17 @@ from inertial.dynamics.transfer_model import Points, fit_transfer
 from pipelines.archive import Archive
 from pipelines.capture.capture import capture
 from pipelines.chain.runner import Runner
-from pipelines.jobs.job import Job, Request
+from pipelines.jobs.job import Job
 from pipelines.jobs.recipes import load_recipe
 from pipelines.procedures import (
     FIGURES,
     PROCEDURES,
-    IncompleteProcedure,
     figures_of_recipe,
-    find_procedures,
     parts_of,
     refuse_unusable,
     roles_of,
 )
-from pipelines.procedures.base import Evaluated, FromWaveforms, OnEquipment, SetsEquipment
+from pipelines.procedures.base import Evaluated, OnEquipment, SetsEquipment
 from pipelines.procedures.transfer_figures import bandwidth_of
 from pipelines.report.unit_panels.procedures import picture
 from pipelines.schedule.steps import steps
@@ -99,44 +96,6 @@ def run(tmp_path_factory: pytest.TempPathFactory):
     for _ in runner.all():
         pass
     return runner.run
-
-
-HALF = """
-from pipelines.procedures.base import *
-class One({bases}):
-    title, order, states, source = "One", 1, "s", "s"
-    roles, part = {roles}, Part
-    figures = ({figures})
-    def steps(self, part, recipe): return []
-{methods}
-PROCEDURE = One()
-"""
-METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "of_unit", "chart", "measure"))
-
-
-REFUSED = {
-    "OnEquipment or SetsEquipment is needed": {"roles": "('exciter',)"},
-    "the equipment of its steps is needed": {"bases": "OnEquipment"},
-    "one is needed for Evaluated": {"bases": "Evaluated"},
-    "Evaluated is needed for them": {"figures": "FigureSpec('half_f', 's', 'm'),"},
-    "a NominalScale is needed": {"bases": "InG"},
-}
-PLAIN = {"bases": "Procedure", "roles": "()", "figures": "", "methods": METHODS}
-
-
-@each([*REFUSED, "no PROCEDURE, one is needed"])
-def test_a_procedure_that_is_half_there_is_refused(
-    refused: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    text = HALF.format(**PLAIN | REFUSED.get(refused, {}))
-    if refused not in REFUSED:
-        text = text.replace("PROCEDURE = One()", "")
-    for ability in (Evaluated, OnEquipment, SetsEquipment, FromWaveforms):
-        with pytest.raises(TypeError, match="abstract method"):
-            type("Bare", (ability,), {"steps": lambda *_: []})()
-    name, path = made_package(tmp_path, monkeypatch, one=text, shared="FEWEST = 3\n")
-    with pytest.raises(IncompleteProcedure, match=rf"{name}\.one: .*{refused}"):
-        find_procedures(name, path)
 
 
 @each(PROCEDURES)
@@ -259,25 +218,12 @@ def take(folder: Path, name: str, sink) -> None:
         capture(station, recipe, lot(), sink, progress=silent, events=sink.events)
 
 
-def test_the_parts_are_checked_with_the_key_that_is_wrong(tmp_path: Path) -> None:
+@each([('kind = "swep"', "sweep"), ('kind = "tilt"\nstep_deg = 17.0', "a whole number")])
+def test_the_parts_are_checked_with_the_key_that_is_wrong(row: tuple[str, str], tmp_path: Path) -> None:
     path = tmp_path / "recipe.toml"
-    for text, message in (
-        ('kind = "swep"', "did you mean 'sweep'|sweep"),
-        ('kind = "tilt"\nstep_deg = 17.0', "a whole number"),
-        ('kind = "sweep"\neffects = ["two_pol"]', "two_pole"),
-    ):
-        path.write_text(HEAD + f"\n[[procedures]]\n{text}\n")
-        with pytest.raises(RecipeInvalid, match=message):
-            parts_of(load_recipe(str(path)))
-
-
-def test_a_list_without_the_multi_position_test_becomes_a_job_with_a_least_value(tmp_path: Path) -> None:
-    recipe_of(tmp_path, ["sweep"])
-    (tmp_path / "limits.toml").write_text('name = "l"\n[figures]\nsweep_bandwidth_hz = { min = 800.0, unit = "Hz" }\n')
-    path = tmp_path / "recipe.toml"
-    path.write_text('limits = "limits.toml"\nunits = ["A1"]\n' + path.read_text())
-    job = Request(str(path)).job(Archive(tmp_path / "archive"))
-    assert job.limits.figures["sweep_bandwidth_hz"].min == 800.0
+    path.write_text(f"{HEAD}\n[[procedures]]\n{row[0]}\n")
+    with pytest.raises(RecipeInvalid, match=row[1]):
+        parts_of(load_recipe(str(path)))
 
 
 def test_the_band_edge_of_a_plain_second_order_model_is_the_closed_form() -> None:

@@ -22,14 +22,8 @@ from schemas import tables
 from stations.profile_files import load_profile, profile_names
 
 ROOT = Path(__file__).resolve().parents[2]
-NEVER_NAMED = {
-    "unit_C",
-    "chamber_C",
-    "time_s",
-    "outer_deg",
-    "inner_deg",
-    "slot",
-}  # also columns of other tables than dwells
+# also columns of other tables than dwells
+NEVER_NAMED = {"unit_C", "chamber_C", "time_s", "outer_deg", "inner_deg", "slot"}
 NEVER_READ = {"outer_deg", "inner_deg", "slot"}
 HERE = {
     "inertial/quantities.py",

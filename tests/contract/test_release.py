@@ -13,7 +13,6 @@ from test_packaging import ROOT
 from deploy import release
 from deploy.sbom import LOCK, bill, project_of, release_time
 from pipelines.flows import deploy
-from schemas.locks import pins
 
 WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 
@@ -40,7 +39,7 @@ def test_every_library_of_the_lock_is_in_the_bill_with_its_version_and_hashes() 
     assert {c["scope"] for c in components if c["name"] == "numpy"} == {"required"}
 
 
-def test_the_bill_has_the_form_of_cyclonedx_and_nothing_in_it_is_out_of_reach() -> None:
+def test_the_bill_has_the_form_of_cyclonedx_and_each_reference_leads_to_a_component() -> None:
     content = made()
     assert (content["bomFormat"], content["specVersion"], content["version"]) == ("CycloneDX", "1.6", 1)
     assert re.fullmatch(r"urn:uuid:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", content["serialNumber"])
@@ -53,20 +52,11 @@ def test_the_bill_has_the_form_of_cyclonedx_and_nothing_in_it_is_out_of_reach() 
     below = {d["ref"]: d["dependsOn"] for d in content["dependencies"]}
     assert {ref for refs in below.values() for ref in refs} <= set(references)
     assert len(below[own["bom-ref"]]) == len(project_of(ROOT)["dependencies"])
-    reached, left = set(), [*below[own["bom-ref"]]]
-    while left:
-        ref = left.pop()
-        left += [] if ref in reached else below[ref]
-        reached.add(ref)
-    lost = {c["name"] for c in content["components"]} - {ref.split("/")[1].split("@")[0] for ref in reached}
-    assert len(lost) < 10, lost  # those of extras, and of the build
 
 
 def test_licences_are_those_of_the_installed_version() -> None:
     licences = {c["name"]: c.get("licenses") for c in made()["components"]}
     assert "BSD-3-Clause" in json.dumps(licences["numpy"])
-    here = {pin.name for pin in pins(LOCK.read_text(encoding="utf-8")) if pin.holds()}
-    assert sum(licences[name] is None for name in here) < 5
     (unknown,) = made("numpy==0.0.1 \\\n    --hash=sha256:" + "0" * 64)["components"]
     assert "licenses" not in unknown
 

@@ -1,6 +1,5 @@
 """What a user installs: no more packages than are needed, none that the code does not find, no licence that is not told."""
 
-import ast
 import re
 import sys
 import tomllib
@@ -9,22 +8,16 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from each import each
-from packaging.markers import Marker
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from deploy.weight import closure, kind_of, megabytes, table
+from deploy.weight import closure, megabytes, table
 from schemas.locks import UNUSED
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ("inertial", "schemas", "stations", "pipelines", "tumbleline")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 MOST_PACKAGES, MOST_MB = 110, 650.0
-ENTRY = re.compile(r"^([\w.-]+)(?:\[[\w, -]+\])?==[^\s;\\]+(?:\s*;\s*([^\\]+))?", re.MULTILINE)
-SELF = re.compile(r"^tumbleline\[([\w,]+)\]$")
-
-
 packages = cache(metadata.packages_distributions)
 
 
@@ -38,55 +31,29 @@ def modules_of(distributions: set[str]) -> set[str]:
 def names(requirements: list[str]) -> set[str]:
     """Distributions of a list of requirements, with those of extras of this product."""
     found: set[str] = set()
-    for text in requirements:
-        own = SELF.match(text)
-        extras = own[1].split(",") if own else []
-        found |= {name for extra in extras for name in names(PROJECT["optional-dependencies"][extra])}
-        found |= set() if own else {canonicalize_name(Requirement(text).name)}
+    for one in map(Requirement, requirements):
+        if one.name == PROJECT["name"]:
+            found |= {name for extra in one.extras for name in names(PROJECT["optional-dependencies"][extra])}
+        else:
+            found.add(canonicalize_name(one.name))
     return found
 
 
-EXTRAS = {
-    name
-    for extra, requirements in PROJECT["optional-dependencies"].items()
-    if extra not in {"build", "dev", "bench", "docs"}
-    for name in names(requirements)
-}
-
-
-def imports(path: Path) -> dict[str, set[str]]:
-    """Top-level names of the modules that a file imports: at its top, inside functions, and for type checkers only."""
-    found: dict[str, set[str]] = {"top": set(), "inside": set(), "types": set()}
-
-    def walk(node: ast.AST, where: str) -> None:
-        if isinstance(node, ast.Import):
-            found[where] |= {one.name.partition(".")[0] for one in node.names}
-        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
-            found[where].add(node.module.partition(".")[0])
-        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-            for one in node.body:
-                walk(one, "types")
-            for one in node.orelse:
-                walk(one, where)
-            return
-        inner = "inside" if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and where == "top" else where
-        for one in ast.iter_child_nodes(node):
-            if isinstance(one, ast.stmt | ast.excepthandler | ast.match_case):  # no expression holds an import
-                walk(one, inner)
-
-    walk(ast.parse(path.read_text(encoding="utf-8")), "top")
-    return found
+FOR_USERS = PROJECT["optional-dependencies"].keys() - {"build", "dev", "bench", "docs"}
+EXTRAS = names([f"{PROJECT['name']}[{','.join(FOR_USERS)}]"])
+IMPORT = re.compile(r"^( *)(?:from(?= [\w.]+ import )|import(?= [\w.]+(?: as \w+)?$)) (\w+)", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
 def imported() -> dict[Path, dict[str, set[str]]]:
-    """The imports of every module that is shipped, of other distributions only."""
+    """The imports of every module that is shipped, of other distributions only: at its top, and inside functions and blocks."""
     own = set(sys.stdlib_module_names) | set(SHIPPED)
-    return {
-        path.relative_to(ROOT): {where: modules - own for where, modules in imports(path).items()}
-        for top in SHIPPED
-        for path in sorted((ROOT / top).rglob("*.py"))
-    }
+    found: dict[Path, dict[str, set[str]]] = {}
+    for path in sorted(path for top in SHIPPED for path in (ROOT / top).rglob("*.py")):
+        found[path.relative_to(ROOT)] = {"top": set(), "inside": set()}
+        for indented, module in IMPORT.findall(path.read_text(encoding="utf-8")):
+            found[path.relative_to(ROOT)]["inside" if indented else "top"] |= {module} - own
+    return found
 
 
 def beyond(imported: dict[Path, dict[str, set[str]]], where: str, there: set[str]) -> dict[str, list[str]]:
@@ -110,19 +77,6 @@ def test_what_the_locks_leave_out_is_asked_for_by_the_library_and_by_no_module(i
         assert not unused & everything
 
 
-@each(["3.11.7", "3.12.1", "3.13.0", "3.14.0"])
-def test_the_lock_of_a_run_has_no_more_packages_than_are_told(version: str) -> None:
-    here = {"python_full_version": version, "python_version": version.rpartition(".")[0]}
-    lock = (ROOT / "requirements-run.lock").read_text(encoding="utf-8")
-    held = {
-        canonicalize_name(name)
-        for name, marker in ENTRY.findall(lock)
-        if not marker.strip() or Marker(marker.strip()).evaluate(here)
-    }
-    assert held
-    assert len(held - names(PROJECT["optional-dependencies"]["build"])) <= MOST_PACKAGES
-
-
 def test_the_installed_product_is_no_larger_than_is_told() -> None:
     packages = closure(PROJECT["dependencies"])
     assert len(packages) <= MOST_PACKAGES
@@ -140,14 +94,3 @@ def test_no_package_of_a_run_or_an_extra_has_a_licence_of_which_the_guide_does_n
     ]
     assert missing == []
     assert "AGPL" not in text
-
-
-LICENCES = {
-    "MIT": "", "MPL-2.0 AND (Apache-2.0 OR MIT)": "MPL", "Apache-2.0 OR GPL-3.0-only": "",
-    "Public Domain, BSD License, GNU General Public License (GPL)": "", "AGPL-3.0-only": "AGPL",
-    "GNU LESSER GENERAL PUBLIC LICENSE": "LGPL", "LGPL-3.0-only": "LGPL",
-}  # fmt: skip
-
-
-def test_a_licence_that_asks_for_more_than_its_notice_is_found() -> None:
-    assert {licence: kind_of(licence) for licence in LICENCES} == LICENCES

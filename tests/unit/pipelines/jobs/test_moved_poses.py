@@ -7,7 +7,7 @@ import pytest
 from capture_double import recipe_file
 
 from inertial.frames import force_from_angles
-from pipelines.drawing.mollweide import direction_at, project
+from pipelines.drawing.mollweide import project
 from pipelines.jobs.moved_poses import moves_of, with_moved_poses
 from pipelines.jobs.recipes import load_recipe
 from pipelines.workbench.routes.plan import dragged_to, save_recipe, turned_to
@@ -26,20 +26,6 @@ def settings(tmp_path: Path) -> WorkbenchSettings:
 @pytest.fixture
 def page(settings: WorkbenchSettings) -> PlanPage:
     return PlanPage(recipe=recipe_file(settings.folder))
-
-
-def force(outer: float, inner: float) -> np.ndarray:
-    return force_from_angles(np.radians(outer), np.radians(inner))
-
-
-def test_a_place_of_the_map_and_its_direction_belong_together() -> None:
-    rng = np.random.default_rng(4)
-    some = rng.normal(size=(200, 3))
-    some /= np.linalg.norm(some, axis=1)[:, None]
-    for direction, x, y in zip(some, *project(some), strict=True):
-        assert direction_at(float(x), float(y)) == pytest.approx(direction, abs=1e-6)
-    assert direction_at(0.0, 1.01) is None
-    assert direction_at(1.9, 0.9) is None
 
 
 def test_a_moved_pose_is_the_only_difference_in_all_its_repetitions_and_moves_that_cannot_be_are_refused() -> None:
@@ -66,7 +52,7 @@ def test_a_moved_pose_is_the_only_difference_in_all_its_repetitions_and_moves_th
 def test_a_drag_turns_the_table_the_nearer_way(settings: WorkbenchSettings, page: PlanPage) -> None:
     for outer, inner in ((45.0, 100.0), (-45.0, 100.0)):
         near = turned_to(settings, page, "p3", outer + 4.0, inner + 4.0)
-        x, y = project(force(outer, inner)[None])
+        x, y = project(force_from_angles(*np.radians([[outer], [inner]])))
         dragged = dragged_to(settings, near, "p3", float(x[0]), float(y[0]))
         assert dragged.pose == (f"p3={outer:g},{inner:g}",)
     with pytest.raises(WrongUse, match="outside"):

@@ -1,11 +1,11 @@
 """Whether the common residual of a lot contradicts the stated table: rates on drawn stations, what run and certificate say."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from capture_double import CaptureDouble, measured_run, small_job
+from long_suites import mostly_slow
 from root_process import ROOT
 
 from benchmarks.budget_lots import plan_of
@@ -60,12 +60,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[float, Run]:
 
 @pytest.mark.parametrize(
     ("size", "count", "least", "most"),
-    [
-        (4.0, 2, 2, 2),
-        pytest.param(1.0, 10, 0, 1, marks=pytest.mark.slow),
-        pytest.param(2.0, 10, 8, 10, marks=pytest.mark.slow),
-        pytest.param(4.0, 10, 10, 10, marks=pytest.mark.slow),
-    ],
+    mostly_slow([(4.0, 2, 2, 2), (1.0, 10, 0, 1), (2.0, 10, 8, 10), (4.0, 10, 10, 10)], (4.0, 2, 2, 2)),
 )
 def test_an_honest_table_is_rarely_told_and_one_twice_or_four_times_as_bad_nearly_always(
     size: float, count: int, least: int, most: int
@@ -104,23 +99,19 @@ def test_a_run_on_a_worse_table_says_what_is_stated_and_what_was_found_and_one_a
     runs: dict[float, Run], capsys: pytest.CaptureFixture[str]
 ) -> None:
     honest, worse = (references_of(runs[urad]) for urad in (50.0, 200.0))
-    assert honest is not None
-    assert worse is not None
     assert honest["worse"] is False
     assert contradiction(honest) == certifiable.refuse_contradicted(runs[50.0]) == ""
     first = worse["seen"][0]
     assert (first["entry"], first["unit"], first["stated"], first["worse"]) == ("pose", "urad", 50.0, True)
     # turned about any axis, not by two angles
     assert 100.0 < first["low"] < first["found"] < (first["high"] or 0.0) < 450.0
-    json.dumps(worse)
     print_references(worse)
     text = capsys.readouterr().out
     assert "CONTRADICTED: the table is worse than stated (p < 0.001)" in text
     assert "repeatability of the poses: stated u 50 µrad, found " in text
     told = " ".join(text.split()).partition("; it cannot show: ")[2]
     assert "seat of the fixture (acts as the misalignment of each unit), local gravity" in told
-    html = stated_references.render(ReportContext(runs[200.0], {}))
-    assert html is not None
+    html = str(stated_references.render(ReportContext(runs[200.0], {})))
     assert "the table is worse than stated" in html
     assert "not contradicted" not in html.lower()
     assert "Not contradicted" in str(stated_references.render(ReportContext(runs[50.0], {})))
@@ -140,7 +131,6 @@ def test_a_contradicted_run_is_not_certified_and_a_weaker_finding_stands_in_the_
     monkeypatch.setattr(certifiable, "REFUTED_BELOW", 0.0)
     proposals, _ = certifying._proposals(run, (), "2026-01-01", "2027-01-01", "")
     judged = references_of(run)
-    assert judged is not None
     assert {one.adequacy for one in proposals} <= {f"ADEQUATE (p = 0.4); {contradiction(judged)}"}
     assert certifiable.refuse_contradicted(run) == contradiction(judged)
 

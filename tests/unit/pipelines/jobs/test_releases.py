@@ -1,22 +1,10 @@
-"""Releases and calibrations of an archive are files with numbers for names; a misspelt kind of device is told."""
+"""A misspelt kind of device of a release is told."""
 
 from pathlib import Path
 
 from in_process import text_of
 
 from pipelines.archive import Archive
-from pipelines.archive.cleaning import clean
-from pipelines.jobs.releases import releases
-
-
-def test_a_superscript_digit_is_no_number_of_a_file(tmp_path: Path) -> None:
-    archive = Archive(tmp_path / "archive")
-    archive.prepare()
-    for folder in ("releases", "calibrations/aa/0123456789abcdef"):
-        (archive.root / folder).mkdir(parents=True)
-        (archive.root / folder / "².json").write_text("{}", encoding="utf-8")
-    assert releases(archive) == []
-    assert clean(archive).anchored == 0
 
 
 def test_a_release_for_a_kind_of_device_that_is_nearly_a_known_one_says_so(tmp_path: Path) -> None:

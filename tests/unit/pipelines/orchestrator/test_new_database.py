@@ -2,7 +2,7 @@
 
 import sqlite3
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -49,25 +49,26 @@ def test_a_second_server_copies_what_is_stored(cache: Path, home: Path, tmp_path
     assert len(made) == len(list(cache.iterdir())) == 1
 
 
-@pytest.mark.parametrize("why", ["cut off", "changed", "empty", "writable by others", "a folder"])
+def a_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+SPOILT: dict[str, Callable[[Path], object]] = {
+    "cut off": lambda path: path.write_bytes(path.read_bytes()[:-1]),
+    "changed": lambda path: path.write_bytes(b"x" + path.read_bytes()[1:]),
+    "empty": lambda path: path.write_bytes(b""),
+    "writable by others": lambda path: path.chmod(0o666),
+    "a folder": a_folder,
+}
+
+
+@pytest.mark.parametrize("why", SPOILT)
 def test_what_is_not_as_it_was_stored_is_made_again(
     why: str, cache: Path, home: Path, tmp_path: Path, made: list[Path]
 ) -> None:
     make_database(home)
-    (stored,) = cache.iterdir()
-    content = stored.read_bytes()
-    match why:
-        case "cut off":
-            stored.write_bytes(content[:-1])
-        case "changed":
-            stored.write_bytes(b"x" + content[1:])
-        case "empty":
-            stored.write_bytes(b"")
-        case "writable by others":
-            stored.chmod(0o666)
-        case _:
-            stored.unlink()
-            stored.mkdir()
+    SPOILT[why](*cache.iterdir())
     second = _folder(tmp_path / "second")
     assert make_database(second)
     assert len(made) == 2
@@ -77,15 +78,14 @@ def test_what_is_not_as_it_was_stored_is_made_again(
     assert len(made) == 2
 
 
-@pytest.mark.parametrize("what", ["version", "migrations"])
+@pytest.mark.parametrize(
+    "what", [("version", lambda _: "3.8.9"), ("_MIGRATIONS", "server/database/_migrations/versions/postgresql")]
+)
 def test_another_prefect_has_a_database_of_its_own(
-    what: str, cache: Path, home: Path, tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch
+    what: tuple[str, object], cache: Path, home: Path, tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make_database(home)
-    if what == "version":
-        monkeypatch.setattr(new_database, "version", lambda _: "3.8.9")
-    else:
-        monkeypatch.setattr(new_database, "_MIGRATIONS", "server/database/_migrations/versions/postgresql")
+    monkeypatch.setattr(new_database, *what)
     assert make_database(_folder(tmp_path / "second"))
     assert len(made) == len(list(cache.iterdir())) == 2
 
@@ -115,8 +115,7 @@ def test_prefect_makes_its_own_where_none_can_be_made(
         case "no cache":
             (tmp_path / "cache").write_bytes(b"no folder can be made below it")
         case "no home":
-            error = RuntimeError("Could not determine home directory.")
-            monkeypatch.setattr(new_database, "cache_folder", Mock(side_effect=error))
+            monkeypatch.setattr(new_database, "cache_folder", Mock(side_effect=RuntimeError("no home directory")))
         case "prefect fails":
             error = subprocess.CalledProcessError(1, ["prefect"])
             monkeypatch.setattr(new_database, "_migrate", Mock(side_effect=error))
@@ -126,14 +125,6 @@ def test_prefect_makes_its_own_where_none_can_be_made(
     left = [path.read_bytes() for path in home.iterdir()] if home.exists() else []
     assert left == ([b"of the user"] if why == "a database" else [])
     assert [path for path in cache.glob("*") if path.is_dir()] == []
-
-
-@pytest.fixture(scope="module", autouse=True)
-def nothing_is_written_into_the_environment() -> Iterator[None]:
-    package = Path(new_database.__file__).parent
-    before = {path.name for path in package.iterdir()}
-    yield
-    assert {path.name for path in package.iterdir()} - before <= {"__pycache__"}
 
 
 def _folder(path: Path) -> Path:

@@ -17,13 +17,7 @@ from schemas.errors import RecipeInvalid
 from schemas.line import Line, staffed
 from schemas.station import load_station
 
-NEEDS = {
-    "soak": {"soak"},
-    "measure": {"measure"},
-    "ramp": {"measure", "soak"},
-    "static": {"static"},
-    "exciter": {"exciter"},
-}
+NEEDS = {one: {one} for one in ("soak", "measure", "static", "exciter")} | {"ramp": {"measure", "soak"}}
 
 
 def phase(kind: str, steps_long: int) -> Phase:
@@ -31,16 +25,8 @@ def phase(kind: str, steps_long: int) -> Phase:
 
 
 def line_of(fixtures: int, lots: int, **keys: object) -> Line:
-    return Line.model_validate(
-        {
-            "name": "drawn",
-            "fixtures": [f"F{k}" for k in range(fixtures)],
-            "load_min": 0.5,
-            "unload_min": 0.5,
-            "lots": [{"recipe": "any", "count": lots}],
-            **keys,
-        }
-    )
+    own = {"name": "drawn", "fixtures": [f"F{k}" for k in range(fixtures)], "lots": [{"recipe": "any", "count": lots}]}
+    return Line.model_validate({**own, "load_min": 0.5, "unload_min": 0.5, **keys})
 
 
 phases = st.lists(st.builds(phase, st.sampled_from(sorted(NEEDS)), st.integers(1, 9)), min_size=1, max_size=5)
@@ -110,17 +96,6 @@ def test_what_is_kept_is_held_while_another_resource_comes() -> None:
     assert broken(line, lots, found.lots) == []
     assert [own.begins[1] - own.begins[0] for own in found.lots] == [6 + 3] * 2
     assert found.bound == found.makespan == Trial(line, lots).steps()
-
-
-def test_the_rules_see_what_is_wrong() -> None:
-    lots = [[phase("soak", 6), phase("measure", 6)]] * 2
-    line = line_of(2, 2, shared=[{"name": "table", "needed_for": ["measure"], "change_min": 0.5, "by_hand": True}])
-    right = shortest(line, lots).lots
-    assert broken(line, lots, right) == []
-    assert broken(line, lots, [right[0], right[0]])
-    first = right[0]
-    later = type(first)(first.load, (first.begins[0], first.begins[1] + 10_000), first.unload + 10_000)
-    assert any("waits" in text for text in broken(line, lots, [later, right[1]]))
 
 
 def test_the_phases_of_a_recipe_take_as_long_as_its_plan_says() -> None:

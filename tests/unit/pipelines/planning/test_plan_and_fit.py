@@ -11,7 +11,6 @@ from long_suites import mostly_slow
 from lots import dwell_rows
 
 from inertial.noise.dwells import DwellNoise
-from inertial.noise.measurands import walk_mean
 from pipelines.jobs.recipes import load_recipe
 from pipelines.planning.context import plan_context
 from pipelines.planning.plan import plan
@@ -44,17 +43,9 @@ def scattered(noise: DwellNoise, seed: int) -> Scatter:
         means = made.dwell_means(slow, start, round(length / STEP_S))
         means = UG * (means + noise.white(length) / UG * rng.standard_normal(means.shape)).reshape(UNITS, 3, -1)
         sd = noise.density * np.sqrt(100.0 / 2.0)
+        more = {"unit_C": state.temperature, "n": round(100 * length)}
         rows = [
-            dwell_rows(
-                f"U{u}",
-                state.time,
-                state.force,
-                state.force + means[u].T,
-                sd,
-                unit_C=state.temperature,
-                n=round(100 * length),
-            )
-            for u in range(UNITS)
+            dwell_rows(f"U{u}", state.time, state.force, state.force + means[u].T, sd, **more) for u in range(UNITS)
         ]
         fitted = fit(pd.concat(rows, ignore_index=True), lots.NO_HISTORY, RECIPE.effects)
         bias = fitted["coefficients"].query("effect == 'bias'").sort_values(["unit", "axis"])["value"].to_numpy() / UG
@@ -85,14 +76,3 @@ def test_plan_and_fit_state_the_bias_s_uncertainty_alike_and_lots_scatter_no_mor
     assert scatter.stated[0] / planned[0] == pytest.approx(1.0, abs=0.45)
     # a fit cannot exclude a walk where there is flicker alone, and carries it over the day as far as it may be there
     assert 0.7 < scatter.stated[1] / planned[1] < (3.0 if name == "flicker" else 1.35)
-
-
-def test_the_mean_of_a_walk_is_off_its_start_as_sums_say() -> None:
-    steps = np.random.default_rng(20_261_140).standard_normal((4000, 400))
-    path = np.cumsum(steps, axis=1)
-    assert np.mean(path[:, :100].mean(axis=1) ** 2) == pytest.approx(
-        walk_mean(np.zeros(1), 0.0, 0.0, 100.0)[1], rel=0.08
-    )
-    assert np.mean(path[:, 100:].mean(axis=1) ** 2) == pytest.approx(
-        walk_mean(np.zeros(1), 0.0, 100.0, 300.0)[1], rel=0.08
-    )

@@ -49,8 +49,6 @@ def test_the_same_dwells_are_known_no_later(context: PlanContext, factor: float)
     found = ordered(context, required)
     assert dwells(found.recipe) == dwells(context.recipe)
     assert found.before == known_after(context, required)
-    assert found.until is not None
-    assert found.before is not None
     assert found.until <= found.before
     again = plan_context(found.recipe, context.station, context.noise)
     assert found.until == known_after(again, required)
@@ -62,7 +60,6 @@ def test_little_that_is_asked_needs_both_ends_alone_and_what_the_whole_plan_reac
     """By hand: nothing is asked but a model that is determined; the way over both ends is shortest from one to the other."""
     found = ordered(context, np.full_like(identified(context).errors, np.inf))
     assert set(found.recipe.temperatures_C[:2]) == {-10.0, 60.0}
-    assert found.until is not None
     assert found.until < 0.6 * context.minutes
     errors = identified(context).errors
     assert known_after(context, 1.001 * errors) == context.minutes

@@ -1,5 +1,6 @@
 """The figures of a centrifuge are those of the axis that was radial."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -40,23 +41,14 @@ def test_figures_have_the_axis_of_the_points(
 
 
 RADIUS_M, SENSOR_M = 0.5, 0.4
-SENSOR = {
-    "kind": "centrifuge",
-    "scale": 1.0,
-    "radius_m": RADIUS_M,
-    "reference_radius_m": SENSOR_M,
-    "reference_ppm": 2500.0,
-    "reference_linearity_ppm": 100.0,
-    "full_scale_g": 30.0,
-}
+SENSOR = {"kind": "centrifuge", "scale": 1.0, "radius_m": RADIUS_M, "full_scale_g": 30.0}
+SENSOR |= {"reference_radius_m": SENSOR_M, "reference_ppm": 2500.0, "reference_linearity_ppm": 100.0}
 
 
 def turned(stretch: float, gain: float) -> list[Taken]:
     """Records of a unit without errors on an arm that stretches, with a sensor of a gain of its own beside it."""
     rng, taken = np.random.default_rng(7), list[Taken]()
-    for number, (way, force) in enumerate(
-        (way, force) for way in (1.0, -1.0) for force in (1.0, 5.0, 10.0, 20.0, 30.0)
-    ):
+    for number, (way, force) in enumerate(product((1.0, -1.0), (1.0, 5.0, 10.0, 20.0, 30.0))):
         omega = np.sqrt(force * 9.80665 / RADIUS_M)
         felt = force * (1.0 + stretch * omega**2)
         read = np.zeros((50, 3))
@@ -86,10 +78,7 @@ def test_a_sensor_on_the_arm_takes_the_stretch_of_the_arm_with_it() -> None:
     assert abs(figures["centrifuge_sensitivity_percent"].value) < 0.01
     assert figures["centrifuge_sensitivity_percent"].uncertainty == pytest.approx(0.25, rel=0.01)
     assert any(text.startswith("reads +") and "beside rω²" in text for text in texts)
-
-
-def test_the_error_of_the_sensor_is_that_of_the_sensitivity_and_one_that_is_off_is_told() -> None:
-    figures, _ = of_sensor(stretch=0.0, gain=1.002)
+    figures, _ = of_sensor(stretch=0.0, gain=1.002)  # the error of the sensor is that of the sensitivity
     assert figures["centrifuge_sensitivity_percent"].value == pytest.approx(-0.2, abs=0.01)
     dead, _ = of_sensor(stretch=0.0, gain=0.0)
     assert "check its cable" in dead["centrifuge_linearity_percent"].note

@@ -60,9 +60,8 @@ def test_distortion_of_the_exciter_is_not_noise_of_a_point_of_a_sweep(rng: np.ra
         output[:, 2] = shaken(rng, 0.03, 1e-3)
         records = (UnitRecord(time, reference), UnitRecord(time, output))
         point = response_point(part, 0, {"frequency_hz": CYCLES_HZ}, records, 2, (0.0, 0.0), device)
-        pulls.append(
-            ((point["value"] - 1.0) / point["uncertainty"], point["phase_deg"] / point["phase_uncertainty_deg"])
-        )
+        errors = point["uncertainty"], point["phase_uncertainty_deg"]
+        pulls.append(((point["value"] - 1.0) / errors[0], point["phase_deg"] / errors[1]))
         sizes.append(point["uncertainty"])
     assert np.median(sizes) == pytest.approx(np.hypot(1e-3, 2e-4) * np.sqrt(2.0 / time.size), rel=0.05)
     low, high = np.sqrt(chi2.ppf([0.005, 0.995], 200) / 200)
@@ -104,12 +103,8 @@ def test_flatness_has_the_scatter_of_a_median(rng: np.random.Generator) -> None:
     error = np.where(frequency > 400.0, 1e-5, 1e-3)  # the scatter is that of the low points
     conditions = Conditions(frequency, np.ones(37), np.full(37, 25.0), np.full(37, 0.2))
     part: Any = SimpleNamespace(axis="z", flat_to_hz=460.0, nominal_scale=1.0, reference_percent=0.25)
-    lost: Any = SimpleNamespace(
-        extended=SimpleNamespace(sensitivity=1.0, sensitivity_error=1e-3),
-        adequate=None,
-        reason="no model",
-        unexplained=False,
-    )
+    extended = SimpleNamespace(sensitivity=1.0, sensitivity_error=1e-3)
+    lost: Any = SimpleNamespace(extended=extended, adequate=None, reason="no model", unexplained=False)
     pulls = []
     for _ in range(1000):
         value = np.asarray(size * (1.0 + error * rng.normal(size=37)), dtype=np.complex128)

@@ -66,11 +66,8 @@ def test_a_lot_gives_what_the_simulated_units_are(measured: Measured) -> None:
         }
         for name, values in truth.items():
             one = figures[name]
-            own = (
-                values["xyz".index(one.axis[0])]
-                if values.ndim == 1
-                else values[tuple("xyz".index(a) for a in one.axis)]
-            )
+            at = tuple("xyz".index(axis) for axis in one.axis)
+            own = values[at[: values.ndim]]
             assert one.identified
             assert abs(one.value - own) < 4.0 * one.uncertainty, name
         assert abs(figures["rotation_radius_mm"].value - 1e3 * radius) < 4.0 * figures["rotation_radius_mm"].uncertainty
@@ -83,25 +80,18 @@ def test_a_lot_gives_what_the_simulated_units_are(measured: Measured) -> None:
         assert "rate steady" in told["drive"]
 
 
-def test_the_points_are_few_and_drawn(measured: Measured) -> None:
+def test_the_points_are_few_and_drawn_and_a_unit_without_an_output_that_changes_says_why(measured: Measured) -> None:
     points, _, sink = measured
+    part, device = parts_of(recipe_of())[0], nominal_device(sink.all(1))
     own = points[points["unit"] == LOT.units[0].serial]
     assert len(own) == 3 * 3 * (2 * 36 + 3)
     assert len(points) < 0.05 * len(sink.all(0))
-    chart = ROTATION.chart(parts_of(recipe_of())[0], own)
-    assert [plot.title for plot in chart.plots] == ["plane xy", "plane yz", "plane xz"]
-    still = own.assign(value=0.0)
-    assert ROTATION.chart(parts_of(recipe_of())[0], still) is None
-
-
-def test_a_unit_without_an_output_that_changes_says_why(measured: Measured) -> None:
-    points, _, sink = measured
-    part, device = parts_of(recipe_of())[0], nominal_device(sink.all(1))
+    assert [plot.title for plot in ROTATION.chart(part, own).plots] == ["plane xy", "plane yz", "plane xz"]
+    assert ROTATION.chart(part, own.assign(value=0.0)) is None
     for value, reason in ((0.0, "constant; check the unit"), (np.nan, "end of its range")):
         outcome = ROTATION.evaluate(part, points.assign(value=value), device)
-        notes = {one.note for one in outcome.figures[LOT.units[0].serial]}
-        assert len(notes) == 1
-        assert reason in notes.pop()
+        (note,) = {one.note for one in outcome.figures[LOT.units[0].serial]}
+        assert reason in note
 
 
 @pytest.mark.slow
@@ -115,10 +105,8 @@ def test_a_door_that_opens_during_a_turn_costs_time_and_no_data(measured: Measur
     _, outcome = evaluated(recipe, sink)
     for unit in LOT.units:
         new, old = ({one.figure: one for one in made.figures[unit.serial]} for made in (outcome, measured[1]))
-        far = abs(new["rotation_misalignment_mrad"].value) - abs(old["rotation_misalignment_mrad"].value)
-        assert abs(far) < 5.0 * (
-            new["rotation_misalignment_mrad"].uncertainty + old["rotation_misalignment_mrad"].uncertainty
-        )
+        new, old = (one["rotation_misalignment_mrad"] for one in (new, old))
+        assert abs(abs(new.value) - abs(old.value)) < 5.0 * (new.uncertainty + old.uncertainty)
 
 
 WRONG: dict[str, dict[str, Any]] = {

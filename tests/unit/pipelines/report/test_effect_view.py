@@ -1,5 +1,6 @@
 """The first picture of a diagnosis: the residual follows the model's curve over the quantity of the effect, and not after it."""
 
+import re
 import sys
 from functools import cache
 
@@ -19,14 +20,13 @@ MODEL = ("bias", "scale", "misalignment")
 
 
 @cache
-def judged(hidden: str) -> Examination:
+def judged(hidden: str, more: tuple[str, ...] = ()) -> Examination:
     effects = ((hidden, 3.0),) if hidden else ()
-    return examination(make(World(units=3, soaks=(25.0,), repeats=2, hidden=effects), 41).dwells, None, MODEL)
+    return examination(make(World(units=3, soaks=(25.0,), repeats=2, hidden=effects), 41).dwells, None, (*MODEL, *more))
 
 
 def first_of(hidden: str) -> EffectView:
     made = judged(hidden)
-    assert made.diagnosis is not None
     return effect_views(made.diagnosis, made.sound)[0]
 
 
@@ -38,23 +38,17 @@ def first_of(hidden: str) -> EffectView:
     ],
 )
 def test_the_residual_is_seen_against_what_the_effect_depends_on(hidden: str, quantity: str) -> None:
-    import re
-
     view = first_of(hidden)
     assert view.effect in next(iter(judged(hidden).document["classes"]))["effects"]
     assert re.fullmatch(quantity, view.quantity)
-    assert view.after is not None
     x, before, after = view.x[view.shown], view.before[view.shown], view.after[view.shown]
-    places, line = view.line(view.shown)
-    followed = np.corrcoef(np.interp(x, places, line), before)[0, 1]
-    assert followed > 0.8
-    assert abs(np.corrcoef(np.interp(x, places, line), after)[0, 1]) < 0.3
+    followed = np.interp(x, *view.line(view.shown))
+    assert np.corrcoef(followed, before)[0, 1] > 0.8
+    assert abs(np.corrcoef(followed, after)[0, 1]) < 0.3
     chart = effect_chart(view)
     assert [plot.title.split(",")[0] for plot in chart.plots] == ["before", "after"]
-    fan = [
-        trace for trace in chart.plots[0].traces if trace.role == "muted" and trace.style == "line" and trace.x.size > 2
-    ]
-    assert len(fan) == 2  # a curve of each other unit
+    lines = [one for one in chart.plots[0].traces if (one.role, one.style) == ("muted", "line") and one.x.size > 2]
+    assert len(lines) == 2  # a curve of each other unit
 
 
 @pytest.mark.slow
@@ -66,12 +60,9 @@ def test_where_nothing_is_missing_the_residual_stands_alone_with_the_noise() -> 
 
 @pytest.mark.slow
 def test_an_effect_of_the_model_is_seen_as_what_it_takes_off() -> None:
-    dwells = make(World(units=3, soaks=(25.0,), repeats=2, hidden=(("third_order", 3.0),)), 41).dwells
-    made = examination(dwells, None, [*MODEL, "third_order"])
-    assert made.diagnosis is not None
+    made = judged("third_order", ("third_order",))
     view = effect_views(made.diagnosis, made.sound, "third_order")[0]
     assert view.effect == "third_order"
-    assert view.after is not None
     assert np.nanstd(view.before) > 1.5 * np.nanstd(view.after)
 
 

@@ -34,11 +34,15 @@ def test_shows_every_unit_rule_and_origin_opens_without_a_network_and_is_the_sam
     assert not re.findall(r"url\((?!#)", page)
     assert all(f'id="{unit}"' in page for unit in ("A1", "A2", "A3"))
     assert page.count("<svg") == 2 + 3 * 3
-    for words in (
-        "Allan deviation", "scale_temperature", "not stated", "ILAC-G8:09/2019 guarded acceptance", "9.8123 m/s²", run.id,
-        str(run.about["capture"]),
-    ):  # fmt: skip
-        assert words in page, words
+    known = (
+        "Allan deviation",
+        "scale_temperature",
+        "not stated",
+        "ILAC-G8:09/2019 guarded acceptance",
+        "9.8123 m/s²",
+        run.id,
+    )
+    assert [words for words in (*known, str(run.about["capture"])) if words not in page] == []
     for words in ("mean of the record", "mean of the day after the record", "mean of a day after the next switch-on"):
         assert page.count(words) >= 3, words
     assert render(run) == page
@@ -86,11 +90,9 @@ def chart(name: str = "measured", count: int = 3) -> Chart:
 def test_the_bundle_is_the_one_of_its_makers_and_the_policy_admits_the_two_scripts_and_no_other(page: str) -> None:
     folder = files("pipelines.drawing") / "vendor"
     text = gzip.decompress((folder / f"{BUNDLE}.gz").read_bytes())
-    assert b"plotly.js (cartesian - minified) v4.1.1" in text[:200]
     assert hashlib.sha256(text).hexdigest() == BUNDLE_SHA256
     assert "Permission is hereby granted" in (folder / "plotly-LICENSE.txt").read_text()
     policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
-    assert policy is not None
     assert page.index("Content-Security-Policy") < page.index("<style>")
     (own,) = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
     (packed,) = re.findall(r'<script type="text/plain" id="plotly">(.*?)</script>', page, flags=re.DOTALL)
@@ -108,17 +110,11 @@ def test_every_figure_has_its_picture_and_the_same_numbers_for_the_script(page: 
     residuals = run.table("residuals")
     wanted = residuals[(residuals["unit"] == "A1") & (residuals["axis"] == "x")]["residual_ug"].to_numpy()
     model = next(one for one in data if one["layout"]["meta"]["title"] == "Model and measurement")
-    drawn = [
-        np.frombuffer(base64.b64decode(trace["y"]["bdata"]), "<f4")
-        for trace in model["data"]
-        if trace["name"] == "residual"
-    ]
+    packed = [base64.b64decode(trace["y"]["bdata"]) for trace in model["data"] if trace["name"] == "residual"]
+    drawn = [np.frombuffer(one, "<f4") for one in packed]
     assert any(one.size == wanted.size and np.allclose(np.sort(one), np.sort(wanted), rtol=1e-5) for one in drawn)
-    labels = {
-        axis["title"]["text"]
-        for name, axis in model["layout"].items()
-        if "axis" in name and axis.get("title", {}).get("text")
-    }
+    axes = [axis for name, axis in model["layout"].items() if "axis" in name]
+    labels = {axis.get("title", {}).get("text") for axis in axes} - {None, ""}
     picture = next(one for one in figures if 'aria-label="Model and measurement"' in one)
     assert labels
     assert all(label in picture for label in labels - {"temperature of the soak / °C"})
@@ -157,11 +153,9 @@ def test_points_lie_at_their_places_in_the_picture() -> None:
 
 def test_all_marks_are_drawn_and_missing_values_are_left_out() -> None:
     x, bad = np.arange(4.0), np.array([1.0, np.nan, 3.0, 2.0])
+    symbols = ("circle", "triangle-up", "triangle-down", "square", "diamond")
     traces = (
-        *(
-            Trace(s, x, bad, symbol=s, error=0.1 + x)
-            for s in ("circle", "triangle-up", "triangle-down", "square", "diamond")
-        ),
+        *(Trace(symbol, x, bad, symbol=symbol, error=0.1 + x) for symbol in symbols),
         Trace("line", x, bad, "line", dashed=True),
         Trace("band", x, bad - 1.0, "band", high=bad + 1.0),
         Trace("bars", x, bad * 0.0 + 1.0, "bars"),
@@ -173,9 +167,8 @@ def test_all_marks_are_drawn_and_missing_values_are_left_out() -> None:
     text = svg_text(Chart("c", (Plot("a", PlotAxis("x"), PlotAxis("y"), traces), sphere("b", (colours,))), 2, scale))
     assert "nan" not in text
     assert "&lt;+x&gt;" in text
-    for colour in ("#2f7bc4", "#d0382f", "#999999"):  # both ends, and a missing value
-        assert f'stroke="{colour}"' in text
-    assert "mean / µg" in text
+    wanted = {f'stroke="{colour}"' for colour in ("#2f7bc4", "#d0382f", "#999999")}  # both ends, and a missing value
+    assert [one for one in (*wanted, "mean / µg") if one not in text] == []
 
 
 @each([(-12.3, 41.0), (0.0, 1.0), (249_000.0, 251_000.0), (-3e-7, 2e-7), (5.0, 5.5)])

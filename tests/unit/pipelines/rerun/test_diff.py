@@ -33,8 +33,7 @@ def whats(document: dict) -> list[tuple[str, str]]:
 
 def test_other_limits_flip_grades_and_no_coefficient_and_are_named(run: Run, tmp_path: Path) -> None:
     limits = tmp_path / "hard.toml"
-    figures = run.table("figures").query("figure == 'zero_g_offset_mg'").eval("value = abs(value)")
-    figures = figures.sort_values("value")
+    figures = run.table("figures").query("figure == 'zero_g_offset_mg'").eval("value = abs(value)").sort_values("value")
     bias = figures["value"].tolist()
     limits.write_text(
         f'name = "hard"\nrule = "simple_acceptance"\n[figures]\nzero_g_offset_mg = {{ max = {bias[1] + 0.1}, unit = "mg" }}\n'
@@ -87,23 +86,22 @@ def test_a_fresh_measurement_differs_by_its_data_and_runs_without_a_common_unit_
 
 
 def test_versions_of_libraries_and_code_are_named(run: Run, larger: Run) -> None:
-    before = {name: (larger.path / f"{name}.json").read_bytes() for name in ("verification", "verification_poses")}
-    for name, content in before.items():
-        manifest = json.loads(content) | {"code": "e" * 64}
-        manifest["libraries"] = manifest["libraries"] | {"numpy": "0.1"}
-        (larger.path / f"{name}.json").write_text(json.dumps(manifest))
+    before = {path: path.read_bytes() for path in larger.path.glob("verification*.json")}
+    for path, content in before.items():
+        manifest = json.loads(content)
+        path.write_text(
+            json.dumps(manifest | {"code": "e" * 64, "libraries": manifest["libraries"] | {"numpy": "0.1"}})
+        )
     try:
         document = diff(run, larger)
     finally:
-        for name, content in before.items():
-            (larger.path / f"{name}.json").write_bytes(content)
+        for path, content in before.items():
+            path.write_bytes(content)
     named = {(row["what"], row["name"]) for row in document["because"]}
     assert {("library", "numpy"), ("code", "verify")} <= named
 
 
-@pytest.mark.parametrize(
-    ("columns", "unlimited"), [(("pfa",), 4.0), ((), 5.0)], ids=["of today", "of earlier versions"]
-)
+@pytest.mark.parametrize(("columns", "unlimited"), [(("pfa",), 4.0), ((), 5.0)])  # of today, of earlier versions
 def test_standard_uncertainties_of_figures_are_found_with_the_factor_that_they_were_expanded_with(
     columns: tuple[str, ...], unlimited: float
 ) -> None:

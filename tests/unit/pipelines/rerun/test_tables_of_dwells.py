@@ -14,7 +14,7 @@ from inertial.effects import additions_forgotten
 from inertial.frames import force_from_angles
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.diagnosis.import_document import import_document
 from pipelines.diagnosis.inputs import judged_effects
 from pipelines.importers.keep import complete_table
@@ -23,6 +23,7 @@ from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.jobs.model_files import use_fitted_model
 from pipelines.jobs.releases import model_digest
 from pipelines.rerun.imported_fit import fit_document
+from pipelines.rerun.reproduce import check
 from pipelines.rerun.rerun import again
 from pipelines.stages.fit import fit
 from pipelines.stages.verify import verify as verified
@@ -43,9 +44,11 @@ def directions() -> Array:
     return np.tile(np.concatenate([faces, np.array(edges) / np.sqrt(2.0)]), (2, 1))
 
 
-def table(rng: np.random.Generator, root: Array | None = None, units: str = "ABC") -> pd.DataFrame:
+def table(
+    rng: np.random.Generator, root: Array | None = None, units: str = "ABC", force: Array | None = None
+) -> pd.DataFrame:
     """A lot in the exchange format without sd and n, with noise of covariance ``root`` (n, n) times its transpose, g²."""
-    force = directions()
+    force = directions() if force is None else force
     n = len(force)
     root = SPREAD_G * np.eye(n) if root is None else root
     made: list[pd.DataFrame] = []
@@ -55,6 +58,13 @@ def table(rng: np.random.Generator, root: Array | None = None, units: str = "ABC
         columns |= {f"force_{axis}": force[:, k] for k, axis in enumerate("xyz")}
         made.append(pd.DataFrame(columns | {f"out_{axis}": output[:, k] for k, axis in enumerate("xyz")}))
     return pd.concat(made, ignore_index=True)
+
+
+def kept(folder: Path, dwells: pd.DataFrame, **how: object) -> Run:
+    """The run that the import of a table of dwells leaves in the archive of a folder."""
+    dwells.to_csv(folder / "lot.csv", index=False)
+    archive = str(folder / "archive")
+    return Archive(archive).run(import_document([folder / "lot.csv"], how, "", "", archive, None, nullcontext)["run"])
 
 
 def errors_over_uncertainties(root: Array, seed: int, effect: str, lots: int = 8) -> Array:
@@ -77,10 +87,7 @@ def test_errors_are_as_large_as_the_residuals_say_where_no_samples_tell_the_nois
         "flicker": 0.2 * white + flicker_kernel(time),
         "walk": white + 4.0 * walk_kernel(time, np.ones(n, dtype=bool)),
     }
-    roots: dict[str, Array] = {
-        name: np.asarray(SPREAD_G * np.linalg.cholesky(covariance), dtype=np.float64)
-        for name, covariance in noises.items()
-    }
+    roots = {name: SPREAD_G * np.linalg.cholesky(covariance) for name, covariance in noises.items()}
     found = {name: errors_over_uncertainties(root, 20 + k, "scale") for k, (name, root) in enumerate(roots.items())}
     found["bias"] = errors_over_uncertainties(roots["white"], 9, "bias")
     inside = {name: float(np.mean(np.abs(ratios) < 2.0)) for name, ratios in found.items()}
@@ -113,22 +120,20 @@ def test_a_bad_dwell_of_one_unit_is_left_out_of_it_alone(tmp_path: Path) -> None
     dwells = table(np.random.default_rng(5))
     dwells.loc[(dwells["unit"] == "B") & (dwells["dwell"] == 7), "out_y"] += 0.004
     dwells.loc[dwells["unit"] == "C", "out_x"] *= -1.0
-    path = tmp_path / "lot.csv"
-    dwells.to_csv(path, index=False)
-    done = import_document([path], {"device": "MY-1"}, "", "", str(tmp_path / "archive"), None, nullcontext)
-    archive = Archive(str(tmp_path / "archive"))
-    whole = again(archive, done["run"], ModelChange())
-    assert {archive.run(run).about["lot"]["device"] for run in (done["run"], whole.new)} == {done["device"]} == {"MY-1"}
-    without = again(archive, done["run"], ModelChange(), left_out=(("B", 7),))
+    imported = kept(tmp_path, dwells, device="MY-1")
+    archive = imported.archive
+    whole = again(archive, imported.id, ModelChange())
+    assert {archive.run(run).about["lot"]["device"] for run in (imported.id, whole.new)} == {"MY-1"}
+    without = again(archive, imported.id, ModelChange(), left_out=(("B", 7),))
     bias = [
         run.table("coefficients").query("unit == 'B' and axis == 'y' and effect == 'bias'")["value"].item()
         for run in (archive.run(whole.new), archive.run(without.new))
     ]
     assert abs(bias[0] - BIAS_G) > 5e-5 > abs(bias[1] - BIAS_G)
-    kept = archive.run(without.new)
-    assert set(kept.about["left_out"]) == {"B:7"}
-    assert set(kept.table("dwells").query("dwell == 7")["unit"]) == {"A", "C"}
-    document = fit_document(kept, whole.new)
+    new = archive.run(without.new)
+    assert set(new.about["left_out"]) == {"B:7"}
+    assert set(new.table("dwells").query("dwell == 7")["unit"]) == {"A", "C"}
+    document = fit_document(new, whole.new)
     assert document["faulty"] == ["C"]
     lines = "\n".join(document["lines"])
     assert "B lacks 7; units are fitted" in lines
@@ -146,12 +151,10 @@ def test_units_of_a_lot_with_gaps_are_fitted_on_what_they_have() -> None:
         for name in ("coefficients", "covariance", "residuals", "wander"):
             own = made[name][made[name]["unit"].isin(units)].reset_index(drop=True)
             pd.testing.assert_frame_equal(own, alone[name])
-    checked = verified(gap, None, *(made[name] for name in ("coefficients", "covariance", "predictions")))[
-        "verification"
-    ]
+    tables = (made[name] for name in ("coefficients", "covariance", "predictions"))
+    checked = verified(gap, None, *tables)["verification"]
     assert checked.groupby("unit")["dwell"].agg(list).to_dict() == {"A": [3, 9], "B": [3, 9], "C": [9]}
-    errors = checked["error_ug"].abs() / checked["uncertainty_ug"]
-    assert errors.max() < 4.0
+    assert (checked["error_ug"].abs() / checked["uncertainty_ug"]).max() < 4.0
 
 
 def test_values_that_all_units_share_are_fitted_where_units_lack_dwells() -> None:
@@ -159,17 +162,10 @@ def test_values_that_all_units_share_are_fitted_where_units_lack_dwells() -> Non
     rng = np.random.default_rng(6)
     outer, inner = rng.uniform(-180.0, 180.0, (2, 40))
     force = force_from_angles(np.radians(outer) + 2e-4, np.radians(inner))
-    angles = {"time_s": 40.0 * np.arange(40), "unit_C": 25.0, "outer_deg": outer, "inner_deg": inner}
-    made: list[pd.DataFrame] = []
-    for unit in "ABCD":
-        out = GAIN * force + BIAS_G + SPREAD_G * rng.normal(size=force.shape)
-        outputs = {f"out_{axis}": out[:, k] for k, axis in enumerate("xyz")}
-        made.append(pd.DataFrame({"unit": unit, "dwell": range(40), **angles, **outputs}))
-    dwells = complete_table(pd.concat(made, ignore_index=True))[0]
+    made = table(rng, units="ABCD", force=force).drop(columns=["force_x", "force_y", "force_z"])
+    dwells = complete_table(made.assign(outer_deg=np.tile(outer, 4), inner_deg=np.tile(inner, 4)))[0]
     model = (*PLAIN, "outer_encoder_offset")
-    lacks = (dwells["unit"] == "C") & dwells["dwell"].isin([4, 11, 20]) | (dwells["unit"] == "A") & (
-        dwells["dwell"] == 7
-    )
+    lacks = (dwells["unit"] + dwells["dwell"].astype(str)).isin(["C4", "C11", "C20", "A7"])
     whole, found = (fit(one, None, model)["coefficients"] for one in (dwells, dwells[~lacks]))
     offset = found.query("effect == 'outer_encoder_offset'")
     np.testing.assert_allclose(np.linalg.norm(dwells[["force_x", "force_y", "force_z"]], axis=1), 1.0)  # at the angles
@@ -186,15 +182,10 @@ def test_values_that_all_units_share_are_fitted_where_units_lack_dwells() -> Non
 
 
 def test_a_model_that_a_unit_does_not_determine_is_named(rng: np.random.Generator) -> None:
-    outer, inner = rng.uniform(-180.0, 180.0, (2, 20))
-    force = force_from_angles(np.radians(outer), np.radians(inner))
-    outputs = {f"out_{axis}": force[:, k] for k, axis in enumerate("xyz")}
-    one = pd.DataFrame(
-        {"dwell": range(20), "time_s": 40.0 * np.arange(20), "outer_deg": outer, "inner_deg": inner} | outputs
-    )
-    dwells = complete_table(pd.concat([one.assign(unit="A"), one.iloc[:3].assign(unit="B")]))[0]
+    dwells = table(rng, units="AB")
+    short = complete_table(dwells[(dwells["unit"] == "A") | (dwells["dwell"] < 3)])[0]
     with pytest.raises(DataRejected, match=r"unit B has 3 dwells, at least 4 are needed .*; leave the unit out"):
-        fit(dwells, None, [*PLAIN, "outer_encoder_offset"])
+        fit(short.assign(outer_deg=0.0, inner_deg=0.0), None, [*PLAIN, "outer_encoder_offset"])
 
 
 def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
@@ -213,18 +204,36 @@ def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
 
 
 def test_an_import_of_a_table_of_dwells_takes_no_mapping_and_a_day_as_a_mapped_table(tmp_path: Path) -> None:
-    path = tmp_path / "lot.csv"
-    table(np.random.default_rng(8), units="ABCD").assign(slot=3).to_csv(path, index=False)
+    dwells = table(np.random.default_rng(8), units="ABCD").assign(slot=3)
     keys = {"units": {"output": "g"}, "measured": "2026-11-20"}
     with pytest.raises(RecipeInvalid, match="threshold finds dwells in samples, each row is a dwell already"):
-        import_document([path], {**keys, "threshold": 3.0}, "", "", str(tmp_path / "archive"), None, nullcontext)
-    dated = import_document([path], keys, "", "", str(tmp_path / "archive"), None, nullcontext)["run"]
-    assert Archive(str(tmp_path / "archive")).run(dated).about["measured"] == "2026-11-20"
-    done = import_document([path], {"units": {"output": "mg"}}, "", "", str(tmp_path / "archive"), None, nullcontext)
-    run = Archive(str(tmp_path / "archive")).run(done["run"])
+        kept(tmp_path, dwells, **keys, threshold=3.0)
+    assert kept(tmp_path, dwells, **keys).about["measured"] == "2026-11-20"
+    run = kept(tmp_path, dwells, units={"output": "mg"})
     assert run.table("dwells")["out_x"].max() < 2e-3
     assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3, 3]
     assert run.about["name"] == "dwells of A, B, C, …"
+
+
+def test_imported_dwells_are_fitted_with_the_plain_model_and_graded_where_limits_are_named(tmp_path: Path) -> None:
+    imported = kept(tmp_path, table(np.random.default_rng(3), units="A"))
+    archive = imported.archive
+    outcome = again(archive, imported.id, ModelChange())
+    assert outcome.because[0]["what"] == "not fitted yet"
+    bias = archive.run(outcome.new).table("coefficients").query("effect == 'bias'")
+    assert bias["value"].to_numpy() == pytest.approx(BIAS_G, abs=5e-5)
+    assert check(archive, outcome.new).same
+    assert again(archive, outcome.new, ModelChange()).new == outcome.new
+    limits = tmp_path / "limits.toml"
+    limits.write_text('name = "plain"\n[figures]\nzero_g_offset_mg = { max = 5.0, unit = "mg" }\n')
+    change = change_from_options(limits=str(limits))
+    (grade,) = archive.run(again(archive, imported.id, change).new).table("grades").to_dict("records")
+    assert grade["outcome"] == "fail"
+    assert "zero_g_offset_mg fail" in grade["reasons"]
+    words = ("--archive", str(archive.root))
+    limits.write_text('name = "wide"\n[figures]\nzero_g_offset_mg = { max = 50.0, unit = "mg" }\n')
+    command(["fit", imported.id, "--limits", str(limits), *words])
+    assert "yield   all 100 %, import 100 %" in command(["audit", *words]).stdout  # where a station's name would stand
 
 
 GLUE = """
@@ -249,9 +258,8 @@ def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The archive had the coefficients of the earlier file below the verdict on the later one."""
-    path, archive = tmp_path / "lot.csv", Archive(str(tmp_path / "archive"))
-    table(np.random.default_rng(8)).to_csv(path, index=False)
-    imported = import_document([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)["run"]
+    run = kept(tmp_path, table(np.random.default_rng(8)))
+    imported, archive = run.id, run.archive
     runs, evidence = list[str](), set[str]()
     for power in (2, 3, 3):
         own = tmp_path / f"glue_{len(runs)}.py"
@@ -273,22 +281,10 @@ def test_a_changed_effect_file_is_another_fit_in_a_run_of_its_own(
     assert not np.allclose(squared, cubed)
 
 
-def test_the_yield_of_an_import_is_that_of_imports(tmp_path: Path) -> None:
-    """It has no station, whose name would stand there."""
-    path, limits, words = tmp_path / "lot.csv", tmp_path / "limits.toml", ["--archive", str(tmp_path / "archive")]
-    table(np.random.default_rng(8), units="AB").to_csv(path, index=False)
-    limits.write_text('name = "wide"\n[figures]\nzero_g_offset_mg = { max = 50.0, unit = "mg" }\n')
-    command(["import", str(path), *words])
-    command(["fit", "--limits", str(limits), *words])
-    assert "yield   all 100 %, import 100 %" in command(["audit", *words]).stdout
-
-
 @pytest.mark.parametrize("last", ["dwells.parquet", "dwells.json", "run.json"])
 def test_a_full_disk_leaves_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, last: str) -> None:
     """A run of an import begins when its tables are there; the same import goes on where it was."""
-    path = tmp_path / "lot.csv"
-    table(np.random.default_rng(8)).to_csv(path, index=False)
-    arguments = ([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    dwells = table(np.random.default_rng(8))
 
     def full(target: Path, data: bytes) -> None:
         if target.name == last:
@@ -298,9 +294,9 @@ def test_a_full_disk_leaves_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with monkeypatch.context() as patched:
         patched.setattr("pipelines.archive.files._write_durably", full)
         with pytest.raises(ArchiveUnusable, match="No space left"):
-            import_document(*arguments)
+            kept(tmp_path, dwells)
     archive = Archive(str(tmp_path / "archive"))
     assert archive.runs() == []
     assert verify(archive, keys={}).checked.findings == []
-    assert archive.run(import_document(*arguments)["run"]).table("dwells").shape[0] == 108
+    assert len(kept(tmp_path, dwells).table("dwells")) == 108
     assert verify(archive, keys={}).checked.findings == []

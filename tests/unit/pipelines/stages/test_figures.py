@@ -27,13 +27,8 @@ def calibration(values: np.ndarray, errors: np.ndarray) -> SimpleNamespace:
     def of(effect: str, what: np.ndarray) -> np.ndarray:
         return what[None, :, None] if effect == "bias" else np.zeros((1, 3, 0))
 
-    return SimpleNamespace(
-        units=("A",),
-        axes=(0, 1, 2),
-        scale=np.ones((1, 3)),
-        value=lambda e: of(e, values),
-        standard_error=lambda e: of(e, errors),
-    )
+    known = {"units": ("A",), "axes": (0, 1, 2), "scale": np.ones((1, 3))}
+    return SimpleNamespace(**known, value=lambda e: of(e, values), standard_error=lambda e: of(e, errors))
 
 
 @pytest.mark.parametrize(("guard", "value", "error"), [(0.0, 9.0, 0.1), (2.5, 8.0, 1.0)])
@@ -75,17 +70,17 @@ def evidence(*, silent: bool) -> GradeEvidence:
 
 
 def test_a_silent_axis_passes_no_limit_and_is_named_and_figures_without_a_limit_carry_the_k_of_the_limits() -> None:
-    tables = grade(evidence(silent=True), parse_limits(LIMITS, "test", UNITS))
+    limits = parse_limits(LIMITS, "test", UNITS)
+    tables = grade(evidence(silent=True), limits)
     row = tables["grades"].iloc[0]
     assert row["outcome"] == "fail"
     assert "velocity_random_walk_ug_rtHz: not determined (axis y: the output never changed)" in row["reasons"]
     assert np.isfinite(tables["figures"]["value"]).all()
-    assert grade(evidence(silent=False), parse_limits(LIMITS, "test", UNITS))["grades"].iloc[0]["outcome"] == "pass"
-    tables = grade(evidence(silent=False), parse_limits(LIMITS, "test", UNITS))
-    own = tables["figures"].set_index("figure")
-    u = 5.0 / np.sqrt(2.0) / np.sqrt(4.0)
-    assert own.loc["residual_rms_ug", "uncertainty"] == pytest.approx(2.5 * u)
-    assert own.loc["residual_rms_ug", "outcome"] == "no limit"
+    tables = grade(evidence(silent=False), limits)
+    assert tables["grades"].iloc[0]["outcome"] == "pass"
+    own = tables["figures"].set_index("figure").loc["residual_rms_ug"]
+    assert own["uncertainty"] == pytest.approx(2.5 * 5.0 / np.sqrt(2.0) / np.sqrt(4.0))
+    assert own["outcome"] == "no limit"
 
 
 def test_the_rms_error_carries_the_uncertainty_of_its_covariance_where_the_run_has_it() -> None:

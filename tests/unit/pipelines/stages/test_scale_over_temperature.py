@@ -44,6 +44,13 @@ def plan(soaks: tuple[float, ...] = (-10.0, 15.0, 40.0, 60.0)) -> tuple[np.ndarr
     return angles, lots.force(angles), np.repeat(soaks, len(angles) // len(soaks))
 
 
+def told(made: PlantDevices, force: np.ndarray, warm: np.ndarray, units: int = 4) -> tuple[State, np.ndarray]:
+    """Outputs (units, n, 3) of forces (n, 3) at temperatures (n,), and the state that knows both."""
+    own = np.repeat(warm[:, None], units, axis=1)
+    output = np.swapaxes(made.output(np.repeat(force[:, None], units, axis=1), own), 0, 1)
+    return State(force=force, time=30.0 * np.arange(len(warm)), temperature=own.T), output
+
+
 def dwells_of(made: PlantDevices, noise_ug: float, rng: np.random.Generator, units: int = 4) -> pd.DataFrame:
     angles, force, warm = plan()
     n = len(warm)
@@ -74,18 +81,14 @@ def test_a_lot_without_hidden_physics_is_adequate_at_a_microg_with_axes_that_lea
 def test_the_fitted_model_is_the_device_and_its_correction_gives_the_force_anywhere(name: str) -> None:
     made = devices(name, 73)
     _, force, warm = plan()
-    output = np.swapaxes(made.output(np.repeat(force[:, None], 4, axis=1), np.repeat(warm[:, None], 4, axis=1)), 0, 1)
-    state = State(force=force, time=30.0 * np.arange(len(warm)), temperature=np.repeat(warm[None], 4, axis=0))
-    first = fit_lot(MODEL, state, output)
+    first = fit_lot(MODEL, *told(made, force, warm))
     assert 1e6 * np.max(np.abs(first.residuals)) < 0.05  # the own axis alone leaves 10 to 200 µg
     elsewhere = np.random.default_rng(5).standard_normal((50, 3))
-    heat = np.random.default_rng(6).uniform(-10.0, 60.0, 50)
-    told = np.swapaxes(made.output(np.repeat(elsewhere[:, None], 4, axis=1), np.repeat(heat[:, None], 4, axis=1)), 0, 1)
-    at = State(force=np.zeros((50, 3)), time=np.zeros(50), temperature=np.repeat(heat[None], 4, axis=0))
-    corrected = correct(MODEL, at, told, first.coefficients, first.nonlinear)
+    state, output = told(made, elsewhere, np.random.default_rng(6).uniform(-10.0, 60.0, 50))
+    unknown = replace(state, force=np.zeros((50, 3)))
+    corrected = correct(MODEL, unknown, output, first.coefficients, first.nonlinear)
     np.testing.assert_allclose(corrected, np.broadcast_to(elsewhere, corrected.shape), atol=2e-7)
-    there = replace(at, force=np.broadcast_to(elsewhere, corrected.shape))
-    np.testing.assert_allclose(predict(MODEL, there, first.coefficients, first.nonlinear), told, atol=2e-7)
+    np.testing.assert_allclose(predict(MODEL, state, first.coefficients, first.nonlinear), output, atol=2e-7)
 
 
 def test_what_firmware_gets_corrects_the_device_at_its_temperatures() -> None:
@@ -97,7 +100,7 @@ def test_what_firmware_gets_corrects_the_device_at_its_temperatures() -> None:
     for unit in range(4):
         exported = polynomials(calibration, f"U{unit}")
         for heat in (-10.0, 25.0, 60.0):
-            out = made.output(np.repeat(force[:, None], 4, axis=1), np.full((20, 4), heat))[:, unit]
+            out = told(made, force, np.full(20, heat))[1][unit]
             np.testing.assert_allclose(corrected_output(*exported, out, heat), force, atol=1e-6)
 
 
@@ -106,7 +109,4 @@ def test_poses_that_differ_between_soaks_give_the_same_axes() -> None:
     made = devices("ADXL355", 75)
     _, force, warm = plan((-20.0, 0.0, 20.0, 40.0, 60.0))
     kept = np.array([k for k in range(len(warm)) if (force[k] @ [0.3, 0.5, 0.8] > -0.4) or warm[k] > 10.0])
-    force, warm = force[kept], warm[kept]
-    output = np.swapaxes(made.output(np.repeat(force[:, None], 4, axis=1), np.repeat(warm[:, None], 4, axis=1)), 0, 1)
-    state = State(force=force, time=30.0 * np.arange(len(warm)), temperature=np.repeat(warm[None], 4, axis=0))
-    assert 1e6 * np.max(np.abs(fit_lot(MODEL, state, output).residuals)) < 0.3
+    assert 1e6 * np.max(np.abs(fit_lot(MODEL, *told(made, force[kept], warm[kept])).residuals)) < 0.3

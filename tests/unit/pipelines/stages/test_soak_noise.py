@@ -28,55 +28,25 @@ def run_of(
     samples, readings = [], []
     for soak, level in enumerate(levels):
         sigma = 1e-6 * DENSITY * np.sqrt(RATE) * np.exp(per_K * (level - 25.0)) * scale
-        for k in range(dwells):
-            record = soak * dwells + k
+        for record in range(soak * dwells, (soak + 1) * dwells):
             parts = []
             for u in range(units):
-                unit = f"U{u}"
-                own = sigma * np.array((louder or {}).get(unit, (1.0, 1.0, 1.0)) if level == levels[-1] else 1.0)
+                known = {"unit": f"U{u}", "record": record, "kind": "dwell"}
+                own = sigma * np.array((louder or {}).get(f"U{u}", (1.0, 1.0, 1.0)) if level == levels[-1] else 1.0)
                 output = rng.uniform(-1.0, 1.0, 3) + own * rng.standard_normal((N, 3))
-                parts.append(
-                    pd.DataFrame(
-                        {
-                            "record": record,
-                            "kind": "dwell",
-                            "unit": unit,
-                            "x": output[:, 0],
-                            "y": output[:, 1],
-                            "z": output[:, 2],
-                        }
-                    )
-                )
-                readings.append(
-                    {
-                        "unit": unit,
-                        "record": record,
-                        "kind": "dwell",
-                        "status": "ok",
-                        "soak": soak,
-                        "unit_C": level + 0.1 * u,
-                        "rate_hz": RATE,
-                        "n": N,
-                    }
-                )
+                parts.append(pd.DataFrame(output, columns=["x", "y", "z"]).assign(**known))
+                of_record = {"status": "ok", "soak": soak, "unit_C": level + 0.1 * u, "rate_hz": RATE, "n": N}
+                readings.append(known | of_record)
             samples.append(pd.concat(parts))
-    names = column_names(("bias", "scale"))
+    axes = [(f"U{u}", axis, k) for u in range(units) for k, axis in enumerate("xyz")]
+    values = {"bias": 0.0, "scale": scale}
     coefficients = pd.DataFrame(
-        [
-            {"unit": f"U{u}", "axis": axis, "effect": effect, "name": name, "value": value, "standard_error": 0.0}
-            for u in range(units)
-            for k, axis in enumerate("xyz")
-            for (effect, name), value in zip(names[k], (0.0, scale), strict=True)
-        ]
+        [(u, axis, *name, values[name[0]], 0.0) for u, axis, k in axes for name in column_names(tuple(values))[k]],
+        columns=["unit", "axis", "effect", "name", "value", "standard_error"],
     )
     covariance = pd.DataFrame(
-        [
-            {"unit": f"U{u}", "axis": axis, "row": i, "column": j, "value": 0.0}
-            for u in range(units)
-            for axis in "xyz"
-            for i in range(2)
-            for j in range(i + 1)
-        ]
+        [(u, axis, i, j, 0.0) for u, axis, _ in axes for i in range(2) for j in range(i + 1)],
+        columns=["unit", "axis", "row", "column", "value"],
     )
     return samples, pd.DataFrame(readings), coefficients, covariance
 

@@ -120,10 +120,9 @@ def test_refuses_the_unit_with_a_fault_and_no_other(tmp_path: Path, fault: str, 
 
 
 def test_a_unit_that_never_answered_has_a_verdict(tmp_path: Path) -> None:
-    job = small_job(tmp_path)
     samples, readings, _ = captured(tmp_path, "")
     without = readings[readings["unit"] != "A3"]
-    verdicts = validate(summarised(samples, without), without, job.lot.units).set_index("unit")
+    verdicts = validate(summarised(samples, without), without, small_job(tmp_path).lot.units).set_index("unit")
     assert verdicts.loc["A3", "refused"]
     assert "no reading for 23 of 23 records" in verdicts.loc["A3", "reason"]
 

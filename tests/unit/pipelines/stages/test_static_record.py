@@ -90,23 +90,24 @@ def test_the_known_tempco_of_a_drifting_room_is_taken_out_of_a_record_and_told(c
     values = 0.25 * white(rng, n) + drift[None, :, None]
     raw, taken = terms(calibration, values), terms(calibration, values, history)
     walk = taken.xs("K", level="term")
-    false = (
-        raw.xs("K", level="term")["identified"]
-        | raw.xs("R", level="term")["identified"]
-        | raw.xs("B", level="term")["identified"]
-    )
+    false = np.any([raw.xs(term, level="term")["identified"] for term in "KRB"], axis=0)
     assert false.mean() > 0.5
     assert not walk["identified"].any()
     assert walk["note"].str.contains("share of the known tempco").all()
     assert (walk["high"] < 0.3 * raw.xs("K", level="term")["high"]).all()
 
 
-@pytest.mark.parametrize("step", [1.0, 1.8], ids=["as large as the noise", "nearly twice the noise"])
-def test_what_rounding_adds_is_taken_out_of_the_white_noise(calibration: dict, step: float) -> None:
-    rng = np.random.default_rng(5_150_905)
+def rounded(calibration: dict, seed: int, step: float) -> pd.DataFrame:
+    """White noise in steps of a share of its standard deviation: the density by unit and axis."""
+    rng = np.random.default_rng(seed)
     lsb = step * WHITE * np.sqrt(RATE / 2.0)
     values = white(rng, 20_000) + rng.uniform(0.0, lsb, (3, 1, 3))
-    rows = terms(calibration, lsb * np.round(values / lsb)).xs("n_d", level="term")
+    return terms(calibration, lsb * np.round(values / lsb)).xs("n_d", level="term")
+
+
+@pytest.mark.parametrize("step", [1.0, 1.8], ids=["as large as the noise", "nearly twice the noise"])
+def test_what_rounding_adds_is_taken_out_of_the_white_noise(calibration: dict, step: float) -> None:
+    rows = rounded(calibration, 5_150_905, step)
     assert rows["note"].str.contains("subtracted from N").all()
     np.testing.assert_allclose(rows["value"], WHITE, rtol=0.04)
     assert (rows["low"] < WHITE).mean() > 0.8
@@ -114,10 +115,7 @@ def test_what_rounding_adds_is_taken_out_of_the_white_noise(calibration: dict, s
 
 
 def test_digits_coarser_than_the_noise_leave_a_limit_that_holds_and_no_value(calibration: dict) -> None:
-    rng = np.random.default_rng(5_150_906)
-    lsb = 5.0 * WHITE * np.sqrt(RATE / 2.0)
-    values = white(rng, 20_000) + rng.uniform(0.0, lsb, (3, 1, 3))
-    rows = terms(calibration, lsb * np.round(values / lsb)).xs("n_d", level="term")
+    rows = rounded(calibration, 5_150_906, 5.0)
     spoken = rows[~rows["note"].str.contains("never changed")]
     assert len(spoken) > 3
     assert not spoken["identified"].any()

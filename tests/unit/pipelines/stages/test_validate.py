@@ -1,5 +1,8 @@
 """Thermometers that freeze, follow a ramp, or stand still."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -85,19 +88,13 @@ def test_a_thermometer_behind_the_chamber_on_an_excursion_is_not_stale_and_one_t
     assert [fault.fault for fault in _stale_temperatures(excursion(stale=True))] == ["stale_temperature"]
 
 
-class Refused:
-    """A run that refused both of its units."""
-
-    id = "follow-up"
-
-    def table(self, name: str) -> pd.DataFrame:
-        if name == "dwells":
-            return pd.DataFrame({"unit": pd.Series([], dtype=str), "dwell": pd.Series([], dtype=int)})
-        return pd.DataFrame({"unit": ["A1", "A2"], "refused": True, "reason": "constant output"})
-
-
 def test_a_follow_up_that_refused_every_unit_is_told() -> None:
+    tables = {
+        "dwells": pd.DataFrame({"unit": pd.Series(dtype=str), "dwell": pd.Series(dtype=int)}),
+        "verdicts": pd.DataFrame({"unit": ["A1", "A2"], "refused": True, "reason": "constant output"}),
+    }
+    run: Any = SimpleNamespace(id="follow-up", table=tables.__getitem__)
     with pytest.raises(
-        DataRejected, match=r"no unit was accepted by all of follow-up.*refused 2 of 2 \(constant output\)"
+        DataRejected, match=r"no unit was accepted by all of follow-up.*refused 2 of 2 \(constant output"
     ):
-        RunSequence((Refused(),)).dwells()  # type: ignore[arg-type]
+        RunSequence((run,)).dwells()

@@ -12,26 +12,17 @@ UNITS, DWELLS = ("A1", "B2", "C3"), 5
 def dwells(rng: np.random.Generator) -> pd.DataFrame:
     unit, dwell = (index.ravel() for index in np.indices((len(UNITS), DWELLS)))
     numbers = ("time_s", "out_x", "out_y", "out_z", "force_x", "force_y", "force_z", "unit_C")
-    return pd.DataFrame(
-        {
-            "unit": np.array(UNITS, dtype=object)[unit],
-            "dwell": dwell,
-            "kind": np.where(dwell < 3, "dwell", np.where(dwell < 4, "verification", "allan")),
-            "pose": [f"p{one}" for one in dwell],
-            "out_unit": "V",
-            "slot": unit,
-            **{name: rng.normal(size=unit.size) for name in numbers},
-            **{name: rng.uniform(1.0, 2.0, unit.size) for name in ("sd_x", "sd_y", "sd_z")},
-            "n": 100,
-        }
-    )
+    columns = {name: rng.normal(size=unit.size) for name in numbers}
+    columns |= {name: rng.uniform(1.0, 2.0, unit.size) for name in ("sd_x", "sd_y", "sd_z")}
+    kind = np.where(dwell < 3, "dwell", np.where(dwell < 4, "verification", "allan"))
+    known = {"unit": np.array(UNITS, dtype=object)[unit], "dwell": dwell, "kind": kind, "pose": dwell.astype(str)}
+    return pd.DataFrame(known | columns | {"out_unit": "V", "slot": unit, "n": 100})
 
 
 def history(rng: np.random.Generator) -> pd.DataFrame:
     time, unit = (index.ravel() for index in np.indices((6, len(UNITS))))
-    frame = pd.DataFrame(
-        {"time_s": 10.0 * time, "unit": np.array(UNITS, dtype=object)[unit], "unit_C": rng.normal(size=time.size)}
-    )
+    names = np.array(UNITS, dtype=object)[unit]
+    frame = pd.DataFrame({"time_s": 10.0 * time, "unit": names, "unit_C": rng.normal(size=time.size)})
     frame.loc[4, "unit_C"] = np.nan
     return frame
 
@@ -70,10 +61,18 @@ def test_rows_of_a_unit_are_found_together_and_scattered(rng: np.random.Generato
 
 def test_a_scatter_of_zero_is_none_and_that_of_the_other_units_counts(rng: np.random.Generator) -> None:
     force = rng.normal(size=(24, 3))
-    table = pd.DataFrame(
-        {"unit": np.repeat(UNITS, 24), "dwell": np.tile(np.arange(24), 3), "time_s": np.tile(np.arange(24.0), 3)}
-    )
-    table = table.assign(kind="dwell", pose="p", out_unit="g", slot=0, n=100, sd_x=1e-3, sd_y=1e-3, sd_z=2e-3)
+    known = {"unit": np.repeat(UNITS, 24), "dwell": np.tile(np.arange(24), 3), "time_s": np.tile(np.arange(24.0), 3)}
+    more = {
+        "kind": "dwell",
+        "pose": "p",
+        "out_unit": "g",
+        "slot": 0,
+        "n": 100,
+        "sd_x": 1e-3,
+        "sd_y": 1e-3,
+        "sd_z": 2e-3,
+    }
+    table = pd.DataFrame(known | more)
     for axis, letter in enumerate("xyz"):
         table[f"force_{letter}"] = table[f"out_{letter}"] = np.tile(force[:, axis], 3)
     table.loc[table["unit"] == "B2", ["sd_x", "sd_y", "sd_z"]] = 0.0

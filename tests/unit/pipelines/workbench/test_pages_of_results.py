@@ -54,9 +54,9 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
     figure["cpk"] = None
     monkeypatch.setattr(Jobs, "result", lambda *_: audited)
     client = client_of(tmp_path / "archive", tmp_path)
-    assert figure["figure"] in client.get("/audit/capability.csv").text
-    heads = client.get("/audit/capability.csv").text.splitlines()[0].split(",")
-    assert {"ppk_low", "cpk_low"} <= set(heads)
+    rows = client.get("/audit/capability.csv").text
+    assert figure["figure"] in rows
+    assert {"ppk_low", "cpk_low"} <= set(rows.splitlines()[0].split(","))
     page = client.get("/audit")
     assert page.status_code == 200
     assert "Capability" in page.text
@@ -80,11 +80,11 @@ def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch:
     assert "differs by wafer" in page.text
     for name in ("levels-D1", "grown-D1", "strongest", "reach"):
         assert client.get(f"/discover/figure/{name}.json").status_code == 200, name
-    assert client.get("/discover/figure/nothing.json").status_code == 422
     rows = client.get("/discover/levels-D1.csv").text.splitlines()
     assert rows[0].startswith("level,size_ug")
     assert rows[1].startswith("W02,")
-    assert client.get("/discover/levels-D7.csv").status_code == 422
+    for name in ("figure/nothing.json", "levels-D7.csv"):
+        assert client.get(f"/discover/{name}").status_code == 422, name
     document = found["document"]
     found["document"] = {**document, "discoveries": [], "pooled": {**document["pooled"], "lots": 0}}
     assert "No lot can be compared" in client.get("/discover").text
@@ -131,12 +131,6 @@ def test_a_unit_has_figures_and_coefficients_with_u_once_and_residuals_against_w
     chart = client.get(f"/unit/figure/residuals.json?run={run.id}&unit=A1&against=time").json()
     assert sum("error_y" in trace for trace in chart["data"]) == 3
     assert f"tumbleline show {run.id} residuals --archive" in page
-    for told, address in {
-        "against = banana": f"/unit?run={run.id}&unit=A1&against=banana",
-        "lot = none": "/operator?lot=none",
-        "since = 2026-02-31": "/units?since=2026-02-31",
-    }.items():
-        assert client.get(address).text.count(f"address: {told} ") == 1
     for path in (run.path / "grades.json", run.path / "grades.parquet", run.report):  # as a fit without limits
         path.unlink(missing_ok=True)
     ungraded = client.get(f"/unit?run={run.id}&unit=A1").text
@@ -175,10 +169,6 @@ def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_
         end, results[key_of(kind, content)] = done_in_process(kind, content, lambda *_: None)
         assert end == "done", results
     text = client.get(state.address()).text
-    sides = requests.two_models(settings, state)
-    for page in (state.address(unit="XX", against="banana"), sides[0].address(unit="XX", against="banana")):
-        told = client.get(page).text
-        assert [told.count(f"address: {part} ") for part in ("unit = XX", "against = banana")] == [1, 1]
     cells = re.findall(r'<td class="n">([^<]*)</td>', text)
     first, second = (results[key_of(kind, content)].document["error"] for kind, content in works[:2])
     assert first["rms_ug"] > 3.0 * second["rms_ug"]
@@ -187,16 +177,11 @@ def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_
     rows = results[key_of(*works[2])]
     scale = next(row for row in rows if row["effect"] == "scale")
     assert abs(scale["over_a"]) > 2.0  # what the cubic gave to the scale factor
-    results[key_of(*works[0])].document["influence"][0]["share"] = 0.000432  # as in a lot of hundreds of units
-    assert ">0.0432<" in client.get(requests.two_models(settings, state)[0].address()).text
     change, expanded = with_uncertainty(scale["change"], 2.0 * scale["u_b"])
     assert f"{change}<br><small>± {expanded}</small>" in text
-    assert "By chance, up to one row in twenty exceeds it" in text
     assert client.get("/two-models/coefficients.csv?" + state.query()).text.count("\n") == len(rows) + 1
     chart = client.get(state.figure("residuals")).json()
-    ranges = {str(chart["layout"][name]["range"]) for name in ("yaxis", "yaxis2")}
-    assert len(ranges) == 1
-    assert client.get(state.figure("nothing")).status_code == 422
+    assert str(chart["layout"]["yaxis"]["range"]) == str(chart["layout"]["yaxis2"]["range"])
 
 
 def test_the_u_of_a_difference_is_that_of_the_larger_model_and_of_models_beside_each_other_the_sum() -> None:
@@ -243,14 +228,8 @@ def test_residuals_follow_the_quantity_that_makes_them() -> None:
     rng = np.random.default_rng(3)
     dwells = pd.DataFrame({"dwell": np.arange(40), "time_s": 600.0 * np.arange(40)})
     for name, values in (("force", np.sin(np.arange(40) * 2.0)), ("time", np.linspace(-1.0, 1.0, 40))):
-        residuals = pd.DataFrame(
-            {
-                "dwell": np.arange(40),
-                "axis": "x",
-                "force_g": np.sin(np.arange(40) * 2.0),
-                "unit_C": rng.normal(25.0, 1.0, 40),
-            }
-        )
+        residuals = pd.DataFrame({"dwell": np.arange(40), "axis": "x", "force_g": np.sin(np.arange(40) * 2.0)})
+        residuals["unit_C"] = rng.normal(25.0, 1.0, 40)
         residuals["residual_ug"] = 50.0 * values**3 + rng.normal(0.0, 1.0, 40)
         assert follows_most(residuals, dwells) == name
     supply = rng.normal(3.3, 0.01, 40)

@@ -17,9 +17,9 @@ from urllib.parse import quote, unquote
 import httpx
 import pytest
 from asgi_client import AsgiClient
-from capture_double import small_run
 from each import each
 
+from pipelines.archive import Run
 from pipelines.workbench import routes
 from pipelines.workbench.application import create_app
 from pipelines.workbench.routes.static_files import PLOTLY, PLOTLY_SHA256
@@ -33,16 +33,9 @@ TO_DO = "reload the page|correct it"
 SCRIPT = "<img src=x onerror=alert(1)><script>alert(2)</script>"
 
 
-@pytest.fixture(scope="module")
-def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("guard")
-    small_run(folder)
-    return folder / "archive"
-
-
 @pytest.fixture
-def settings(archive: Path, tmp_path: Path) -> WorkbenchSettings:
-    return WorkbenchSettings(archive=str(archive), folder=tmp_path / "bench", token=TOKEN)
+def settings(run: Run, tmp_path: Path) -> WorkbenchSettings:
+    return WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
 
 
 @pytest.fixture
@@ -65,10 +58,8 @@ def test_answers_to_the_names_of_this_machine_alone(client: AsgiClient) -> None:
 
 def test_every_change_needs_its_own_origin_and_the_token(client: AsgiClient) -> None:
     known = {"authorization": f"Bearer {TOKEN}"}
-    assert change(client).status_code == 403
-    assert change(client, origin=ORIGIN).status_code == 403
-    assert change(client, origin="http://evil.example", **known).status_code == 403
-    assert change(client, origin="null", **known).status_code == 403
+    for foreign in ({}, {"origin": ORIGIN}, {"origin": "http://evil.example", **known}, {"origin": "null", **known}):
+        assert change(client, **foreign).status_code == 403, foreign
     assert change(client, authorization="Bearer another").status_code == 403
     assert change(client, origin=ORIGIN, **known).status_code == 422  # let through: there is no such lot
     assert change(client, **known).status_code == 422
@@ -94,14 +85,11 @@ def enter(client: AsgiClient, address: str = "/units") -> tuple[str, str]:
 
 def test_the_token_of_the_address_becomes_a_session_that_no_script_reads(client: AsgiClient) -> None:
     answer = client.get(f"/missing?source=x&token={TOKEN}")
-    assert answer.status_code == 303
-    assert answer.headers["location"].partition("#")[0] == "/missing?source=x"
+    address, _, proof = answer.headers["location"].partition("#change=")
+    assert (answer.status_code, address) == (303, "/missing?source=x")
     assert TOKEN not in str(answer.headers)
-    cookie = answer.headers["set-cookie"].lower()
-    assert "httponly" in cookie
-    assert "samesite=strict" in cookie
+    assert {"httponly", "samesite=strict"} <= {*re.split("; ?", answer.headers["set-cookie"].lower())}
     assert client.get("/missing?token=wrong").status_code == 403
-    proof = answer.headers["location"].rpartition("#change=")[2]
     assert change(client, origin=ORIGIN, **{PROOF: proof}).status_code == 422  # the client keeps the cookie
 
 
@@ -205,25 +193,20 @@ def raw(settings: WorkbenchSettings, path: str, query: str = "", http: str = "1.
     return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=body)
 
 
-def test_from_another_machine_nothing_is_read_without_the_token(archive: Path, tmp_path: Path) -> None:
-    far = WorkbenchSettings(
-        archive=str(archive), folder=tmp_path, host="0.0.0.0", names=("bench.example",), token=TOKEN, proxied=True
-    )
+def test_from_another_machine_nothing_is_read_without_the_token(settings: WorkbenchSettings) -> None:
+    far = replace(settings, host="0.0.0.0", names=("bench.example",), proxied=True)
     client = AsgiClient(create_app(far), "https://bench.example")
-    assert client.get("/units").status_code == 403
-    assert client.get(f"/units?token={TOKEN}").status_code == 303
-    assert client.get("/units").status_code == 200
+    for address, status in (("/units", 403), (f"/units?token={TOKEN}", 303), ("/units", 200)):
+        assert client.get(address).status_code == status, address
     with pytest.raises(WrongUse, match="encryption"):
-        create_app(WorkbenchSettings(archive=str(archive), folder=tmp_path, host="0.0.0.0"))
+        create_app(replace(settings, host="0.0.0.0"))
 
 
 def test_pages_carry_a_policy_that_runs_no_script_but_our_files(client: AsgiClient) -> None:
     answer = client.get("/units")
-    assert "script-src 'self';" in answer.headers["content-security-policy"]
-    assert "unsafe-eval" not in answer.headers["content-security-policy"]
-    assert TOKEN not in answer.text
-    assert "<script>" not in answer.text
-    assert " on" + "click" not in answer.text
+    policy = answer.headers["content-security-policy"]
+    assert ("script-src 'self';" in policy, "unsafe-eval" in policy) == (True, False)
+    assert [text for text in (TOKEN, "<script>", " on" + "click") if text in answer.text] == []
 
 
 ADDRESSES: list[tuple[str, set[int], str]] = [  # address, statuses, and what stands on the page
@@ -260,11 +243,6 @@ def test_what_an_address_says_is_text_and_never_markup_sql_a_file_or_a_defect(
 def test_the_drawing_library_is_the_one_that_was_checked(client: AsgiClient) -> None:
     packed = (files("pipelines.workbench") / "static" / "vendor" / f"{PLOTLY}.gz").read_bytes()
     assert hashlib.sha256(gzip.decompress(packed)).hexdigest() == PLOTLY_SHA256
-    assert b"plotly.js (strict - minified) v4.1.1" in gzip.decompress(packed)[:200]
-    assert (
-        "Permission is hereby granted"
-        in (files("pipelines.workbench") / "static" / "vendor" / "plotly-LICENSE.txt").read_text()
-    )
     answer = client.get(f"/static/x/{PLOTLY}", headers={"accept-encoding": "gzip"})
     assert "immutable" in answer.headers["cache-control"]
     assert hashlib.sha256(answer.content).hexdigest() == PLOTLY_SHA256
@@ -280,10 +258,7 @@ def test_a_figure_of_a_unit_without_data_is_a_sentence(figure: tuple[str, str], 
 
 SLOTS = ("slot-x", "slot-", "slot-²", "slot-8", "slot--1", "slot-01", "slot-99999", "slot-" + "9" * 5000)
 REFUSED_BODIES: list[tuple[str, object, str]] = [
-    *(
-        ("/operator/start", {"recipe": "production", key: "A1"}, "a slot from 0 to 7 of the station is needed")
-        for key in SLOTS
-    ),
+    *(("/operator/start", {"recipe": "production", key: "A1"}, "a slot from 0 to 7 of the station") for key in SLOTS),
     ("/operator/start", {"recipe": "production", "slot-1": "A\0"}, TO_DO),
     ("/operator/start", {"recipe": "\ud800"}, TO_DO),
     ("/jobs", {"kind": "\ud800"}, TO_DO),
@@ -297,14 +272,10 @@ REFUSED_BODIES: list[tuple[str, object, str]] = [
 @each(REFUSED_BODIES, ascii)
 def test_a_body_that_cannot_be_used_is_a_sentence(case: tuple[str, object, str], client: AsgiClient) -> None:
     address, body, said = case
-    answer = told(client, address, body)
+    headers = {"authorization": f"Bearer {TOKEN}", "content-type": "application/json"}
+    answer = client.post(address, headers=headers, content=json.dumps(body))
     assert answer.status_code == 422
     assert re.search(said, answer.json()["problem"])
-
-
-def told(client: AsgiClient, address: str, body: object) -> httpx.Response:
-    headers = {"authorization": f"Bearer {TOKEN}", "content-type": "application/json"}
-    return client.post(address, headers=headers, content=json.dumps(body))
 
 
 def test_an_empty_archive_has_every_page_with_what_to_do(tmp_path: Path) -> None:

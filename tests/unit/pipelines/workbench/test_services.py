@@ -12,21 +12,27 @@ from importlib.resources import files
 from multiprocessing import Pipe
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pandas as pd
 import pytest
 from capture_double import recipe_file
 
+from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive
+from pipelines.audit.sql import ask
 from pipelines.jobs.job import Request
 from pipelines.jobs.model_files import read_model
 from pipelines.workbench.routes.operator import station_named, stations_of
+from pipelines.workbench.routes.unit import history_question
+from pipelines.workbench.routes.units import newest_question, yield_question
+from pipelines.workbench.services import index as shared
 from pipelines.workbench.services import jobs as job_table
 from pipelines.workbench.services import lots, models, requests, sources, uploads
 from pipelines.workbench.services.jobs import Jobs, _serve
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
-from pipelines.workbench.state import PlanPage
+from pipelines.workbench.state import PlanPage, UnitsPage
 from schemas.errors import TumblelineError, WrongUse
 
 
@@ -35,11 +41,12 @@ def settings(tmp_path: Path) -> WorkbenchSettings:
     return WorkbenchSettings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token="t")
 
 
-def ended(table: Jobs, name: str) -> job_table.BackgroundJob:
+def left(table: Jobs, name: str, *states: str) -> job_table.BackgroundJob:
+    """A job when it is in none of these states any more."""
     end = time.monotonic() + 60.0
-    while (job := table.get(name)).state not in job_table.ENDED:
+    while (job := table.get(name)).state in states:
         assert time.monotonic() < end
-        time.sleep(0.02)
+        time.sleep(0.01)
     return job
 
 
@@ -57,20 +64,17 @@ def test_a_stopped_job_ends_its_process_and_the_next_one_runs_is_shared_and_fail
     table = Jobs(tmp_path / "jobs.json", workers=1)
     request = {"recipe": "production", "effects": [], "station": "", "archive": str(tmp_path)}
     job = table.submit("plan", "a plan", request)
-    end = time.monotonic() + 60.0
-    while table.get(job.id).state == "waiting":
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    left(table, job.id, "waiting")
     assert table.stop(job.id).state == "stopped"
     bad = {**request, "recipe": str(tmp_path / "none.toml")}
     first, second = table.submit("plan", "another", bad), table.submit("plan", "another", bad)
     assert first is second
-    failed = ended(table, first.id)
+    failed = left(table, first.id, "waiting", "running")
     assert failed.state == "failed"
     assert "none.toml" in failed.problem
     assert table.result("plan", bad) is None
     assert table.submit("plan", "another", bad).id == first.id  # a failure can be tried again
-    ended(table, first.id)
+    left(table, first.id, "waiting", "running")
     assert table.get(job.id).state == "stopped"
     assert table.result("plan", request) is None
     table.forget("plan", request)  # what it made was removed
@@ -88,12 +92,10 @@ def test_a_stopped_job_ends_its_process_and_the_next_one_runs_is_shared_and_fail
 def lot_of(settings: WorkbenchSettings, **state: object) -> str:
     place = settings.folder / "lots" / "abc"
     place.mkdir(parents=True)
-    (place / "request.json").write_text(
-        json.dumps({"recipe": "r", "seats": [[0, "A1"], [3, "A2"]], "units": ["A1", "A2"]})
-    )
-    (place / "state.json").write_text(
-        json.dumps({"phase": "asks", "number": 2, "since": time.time(), "pid": os.getpid(), **state})
-    )
+    request = {"recipe": "r", "seats": [[0, "A1"], [3, "A2"]], "units": ["A1", "A2"]}
+    (place / "request.json").write_text(json.dumps(request))
+    phase = {"phase": "asks", "number": 2, "since": time.time(), "pid": os.getpid()}
+    (place / "state.json").write_text(json.dumps(phase | state))
     return "abc"
 
 
@@ -116,9 +118,7 @@ def test_a_lot_whose_process_is_gone_is_interrupted(settings: WorkbenchSettings)
     os.waitpid(gone, 0)
     name = lot_of(settings, pid=gone)
     (lot,) = lots.lots(settings)
-    assert lot.id == name
-    assert lot.phase == "interrupted"
-    assert lot.ended
+    assert (lot.id, lot.phase, lot.ended) == (name, "interrupted", True)
     assert lot.slots == ((0, "A1", ""), (3, "A2", ""))
 
 
@@ -196,24 +196,23 @@ def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: Workbe
 
 
 def test_lots_are_paused_and_waited_for_when_the_service_ends(settings: WorkbenchSettings) -> None:
-    script = (
-        "import json, pathlib, signal, sys, time\n"
-        "place = pathlib.Path(sys.argv[1]) / 'state.json'\n"
-        "def safe(*_):\n"
-        "    place.write_text(json.dumps({**json.loads(place.read_text()), 'phase': 'stopped'}))\n"
-        "    sys.exit(0)\n"
-        "signal.signal(signal.SIGTERM, safe)\n"
-        "print('ready', flush=True)\n"
-        "time.sleep(60)\n"
-    )
+    script = """
+import json, pathlib, signal, sys, time
+place = pathlib.Path(sys.argv[1]) / "state.json"
+def safe(*_):
+    place.write_text(json.dumps({**json.loads(place.read_text()), "phase": "stopped"}))
+    sys.exit(0)
+signal.signal(signal.SIGTERM, safe)
+print("ready", flush=True)
+time.sleep(60)
+"""
     place = settings.folder / "lots" / "abc"
     with subprocess.Popen([sys.executable, "-c", script, str(place)], stdout=subprocess.PIPE) as process:
-        name = lot_of(settings, pid=process.pid, phase="measuring")
+        lot_of(settings, pid=process.pid, phase="measuring")
         assert process.stdout.readline() == b"ready\n"
         assert lots.pause_all(settings) == []
         assert process.wait(10.0) == 0
     assert lots.state_of(place).phase == "paused"
-    assert name == "abc"
 
 
 def test_a_model_is_saved_version_by_version_with_its_formulas(settings: WorkbenchSettings) -> None:
@@ -223,10 +222,8 @@ def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Workben
     model = read_model(place)
     assert model.model.effects == ["bias", "scale", "third_order", "humid"]
     assert [change.why for change in model.change][1:] == ["seen twice", "seen twice"]
-    assert (
-        models.save(settings, "line-1", start, ["third_order", "humid", "second_order"], formulas, "more", "run-8")[1]
-        == 4
-    )
+    added = ["third_order", "humid", "second_order"]
+    assert models.save(settings, "line-1", start, added, formulas, "more", "run-8")[1] == 4
     with pytest.raises(WrongUse, match="already"):
         models.save(settings, "line-1", start, ["third_order"], [], "again", "run-8")
     with pytest.raises(WrongUse, match="other effects"):
@@ -234,8 +231,7 @@ def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Workben
     recipe, sample = settings.folder / "six.toml", Path(__file__).parents[4] / "deploy/recipes/line-six.toml"
     recipe.write_text(re.sub(r"effects = .*", f'model = "{place}"', sample.read_text()))
     before = requests.plan(settings, PlanPage(recipe=str(recipe)))[1]
-    added = ["third_order", "humid", "second_order", "cross_coupling"]
-    assert models.save(settings, "line-1", start, added, formulas, "more", "run-8")[1] == 5
+    assert models.save(settings, "line-1", start, [*added, "cross_coupling"], formulas, "more", "run-8")[1] == 5
     assert requests.plan(settings, PlanPage(recipe=str(recipe)))[1] != before  # the recipe's file is as it was
     for name, why in (("../x", "a reason"), ("ok", "  "), ("", "a reason")):
         with pytest.raises(WrongUse):
@@ -285,16 +281,8 @@ def test_files_of_the_folder_alone_are_sources_and_an_upload_stays_in_it_whateve
 def test_a_run_that_was_added_is_in_the_next_answer_and_an_unchanged_archive_is_not_looked_at_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pipelines.workbench.services import index as shared
-
-    looked: list[int] = []
-    look = shared.up_to_date
-
-    def counted(archive: Archive) -> object:
-        looked.append(1)
-        return look(archive)
-
-    monkeypatch.setattr(shared, "up_to_date", counted)
+    looked = Mock(side_effect=shared.up_to_date)
+    monkeypatch.setattr(shared, "up_to_date", looked)
     archive = Archive(str(tmp_path / "archive"))
     recent = shared.RecentIndex(str(tmp_path / "archive"))
     question = "SELECT run FROM runs ORDER BY run"
@@ -303,26 +291,19 @@ def test_a_run_that_was_added_is_in_the_next_answer_and_an_unchanged_archive_is_
     for number in range(3):
         names.append(archive.open_run(f"lot{number}", {"recipe": {"name": "r"}, "lot": {"units": []}}, number).id)
         assert [name for (name,) in recent.ask(question).rows] == names
-    before = len(looked)
+    before = looked.call_count
     for _ in range(5):
         recent.ask(question)
-    assert len(looked) == before
+    assert looked.call_count == before
     monkeypatch.setattr(shared, "USABLE_S", 0.0)  # old
     recent.ask(question)
-    assert len(looked) == before + 1
+    assert looked.call_count == before + 1
 
 
 def test_a_search_in_memory_gives_what_the_files_of_the_archive_give(tmp_path: Path) -> None:
-    from benchmarks.generated_archive import write_archive
-    from pipelines.audit.sql import ask
-    from pipelines.workbench.routes.unit import history_question
-    from pipelines.workbench.routes.units import newest_question, yield_question
-    from pipelines.workbench.services.index import RecentIndex
-    from pipelines.workbench.state import UnitsPage
-
     archive = tmp_path / "archive"
     write_archive(archive, 6, years=2.0, seed=3, workers=1)
-    recent = RecentIndex(str(archive))
+    recent = shared.RecentIndex(str(archive))
     pages = [
         UnitsPage(), UnitsPage(search="3", order="unit"), UnitsPage(outcome="fail", order="station", page=2),
         UnitsPage(station="line-1", since="2022-01-01", order="outcome"),
