@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import printed_pages as pages
 import pytest
-from c_compiler import FIXED, REAL, compiled
+from c_compiler import compiled
 from capture_double import LSB_PER_G, CaptureDouble, small_job
 from each import each
 from in_process import document_of, given, refused, text_of
@@ -22,7 +22,6 @@ from inertial.correction import output_covariance
 from inertial.state import State
 from pipelines.archive import Archive, Run
 from pipelines.chain.runner import Runner
-from pipelines.export import ExportSettings, export_files, unit_calibrations
 from pipelines.tables.calibration import read_calibration
 
 RATE, GRAVITY_G = 100.0, 9.8123 / 9.80665
@@ -71,7 +70,6 @@ def corrected(
 
 
 def still(run: Run, rng: np.random.Generator, n: int, *, warm: float = 25.0, **how: Any) -> pd.DataFrame:
-    """A recording of n samples with z up."""
     force, bias = how.get("force", (0.0, 0.0, 1.0)), how.get("bias", np.zeros(3))
     return raw(run, np.tile(force, (n, 1)), np.full(n, warm), rng, bias)
 
@@ -81,7 +79,6 @@ def test_forces_come_back_within_their_uncertainty(run: Run, home: Path, rng: np
     force /= np.linalg.norm(force, axis=1)[:, None]
     document, table = corrected(run, raw(run, force, rng.uniform(0.0, 50.0, 4000), rng, np.zeros(3)), status=0)
     assert (table[FORCES].to_numpy() - force).std() < 3e-5
-    assert (document["samples"], document["bias"]) == (4000, None)
     assert document["u_contains"] == ["references and noise of the calibration"]
     # the seat of the fixture is stated to 1 mrad (rotations about each axis): √(1 − f²) of it on an axis
     across = np.sqrt(1.0 - force[:, 0] ** 2)
@@ -107,18 +104,6 @@ def test_the_covariance_of_the_noise_covers_the_error(run: Run, rng: np.random.G
         )
         pulls.append((corrected - force) / np.sqrt(np.diagonal(own, axis1=1, axis2=2) + (0.29 / LSB_PER_G) ** 2))
     assert 0.65 < np.sqrt(np.mean(np.square(pulls))) < 1.35  # 45 coefficients were drawn
-
-
-def test_the_arithmetic_is_that_of_the_exported_c(run: Run, home: Path, rng: np.random.Generator) -> None:
-    force = rng.normal(size=(300, 3))
-    force /= np.linalg.norm(force, axis=1)[:, None]
-    table = raw(run, force, np.round(rng.uniform(0, 50, 300), 3), rng, np.zeros(3))
-    _, done = corrected(run, table)
-    unit = unit_calibrations(run, ("A1",), failed=True)
-    for arithmetic, call, within in (("double", REAL.replace("REAL", "double"), 1e-9), ("q24", FIXED, 1e-6)):
-        [header] = export_files("c", unit, run.id, ExportSettings(arithmetic=arithmetic)).values()
-        own = compiled(header.decode(), call, table[["x", "y", "z", "unit_C"]].to_numpy(), home, "A1")
-        assert np.max(np.abs(own - done[FORCES].to_numpy())) < within
 
 
 def test_the_bias_is_found_where_the_force_is_known_and_its_uncertainty_grows_after(
@@ -279,7 +264,6 @@ def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path,
     assert np.diff(added, axis=0).std(axis=0) / np.sqrt(2.0) == pytest.approx(expected, rel=0.1)
     document_of(*own, "--seed", "3", "--bandwidth", "5", "--output", "raw.mat")
     slow = loadmat("raw.mat")
-    assert slow["x"].shape == (n, 1)
     assert np.std(slow["x"][:, 0] - seen["x"]) > 100.0
     flight.drop(columns="unit_C").assign(force_x=400.0).to_csv("flight.csv", index=False)
     clipped = document_of(*own, "--output", "raw.csv")

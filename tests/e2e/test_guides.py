@@ -31,7 +31,6 @@ def nothing(_page: str) -> None:
 
 
 def line(_page: str) -> None:
-    """The archive of one run."""
     run = finished_run(Path.cwd())
     Path("sent-by-mail.parquet").write_bytes((run.path / "grades.parquet").read_bytes())
 
@@ -43,7 +42,6 @@ def factory(page: str) -> None:
 
 
 def old_runs(_page: str) -> None:
-    """A run, and a model to run it again with."""
     small_run(Path.cwd())
     Path("model.toml").write_text(MODEL, encoding="utf-8")
 
@@ -55,7 +53,6 @@ def game(_page: str) -> None:
 
 
 def positions(page: str) -> None:
-    """The table of the page as a file."""
     Path("positions.csv").write_text(pages.blocks(page, "csv")[0], encoding="utf-8")
 
 
@@ -116,7 +113,6 @@ SLOW = [
     Guide("docs/how-to/run-an-archive-again.md", old_runs),
     Guide("docs/how-to/release-a-model.md", old_runs),
 ]  # fmt: skip
-"""Guides whose commands start processes of their own, or search for long."""
 
 ELSEWHERE = {
     "practise-on-a-station": "tests/e2e/test_practice.py",

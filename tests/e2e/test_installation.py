@@ -5,30 +5,21 @@ import fcntl
 import importlib
 import os
 import shutil
-import sqlite3
-import stat
 import subprocess
 import sys
-import sysconfig
-from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
-import orchestrator
 import pytest
 from each import each
 
 from pipelines.archive import files
 from pipelines.flows import local
 from pipelines.orchestrator import server
-from pipelines.orchestrator.new_database import NAME, make_database
-from pipelines.orchestrator.settings import DATABASE
-from pipelines.workbench.services import work
 from schemas.errors import ArchiveUnusable, TumblelineError
 from schemas.installed import not_installed
 
 START = "import sys; sys.modules[{missing!r}] = None; sys.argv[0] = 'tumbleline'; from pipelines.__main__ import main; main()"
-PACKAGES = Path(sysconfig.get_path("purelib"))
 
 
 def raised(path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> ImportError:
@@ -68,21 +59,6 @@ def test_a_library_that_is_missing_or_does_not_load_is_named_with_the_reason_and
     defect = raised(tmp_path / "site-packages" / "old_plugin.py", "import inertial.no_such_module", monkeypatch)
     for other in (of_a_user, defect, ValueError("x"), ImportError("made, not raised")):
         assert not_installed(other) is None
-
-
-def test_work_of_the_workbench_says_it_too(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    problem = raised(tmp_path / "site-packages" / "needy_too.py", "import absent_two", monkeypatch)
-
-    def fails(*_: object) -> None:
-        raise problem
-
-    monkeypatch.setitem(work.WORK, "fails", fails)
-    state, text = work.done_in_process("fails", {}, lambda *_: None)
-    assert state == "failed"
-    assert text.startswith("the library 'absent_two' is not installed")
-    assert "absent_two" in capsys.readouterr().err
 
 
 LAST_LINES = {
@@ -135,49 +111,3 @@ def test_a_server_whose_folder_is_gone_or_whose_clients_have_gone_leaves(
         assert (tmp_path / server.ADDRESS).is_file()
     assert server._left(tmp_path)
     assert not (tmp_path / server.ADDRESS).exists()  # it takes its address away
-
-
-@pytest.mark.slow  # every server of tests/e2e/test_orchestrator.py starts with such a database
-def test_prefect_itself_makes_an_empty_database_which_is_copied_and_has_nothing_left_to_migrate(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv(DATABASE, raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    home, another = tmp_path / "home", tmp_path / "another"
-    home.mkdir()
-    another.mkdir()
-    assert make_database(home)
-    assert [path.name for path in home.iterdir()] == [NAME]
-    assert stat.S_IMODE((home / NAME).stat().st_mode) == 0o600
-    with closing(sqlite3.connect(home / NAME)) as database:
-        tables = [name for (name,) in database.execute("select name from sqlite_master where type = 'table'")]
-        entries = {name: database.execute(f'select count(*) from "{name}"').fetchone()[0] for name in tables}
-        assert {name for name, count in entries.items() if count} == {"alembic_version"}
-        assert "flow_run" in tables
-        assert database.execute("pragma journal_mode").fetchone() == ("wal",)
-    (stored,) = (tmp_path / "cache" / "tumbleline").iterdir()
-    assert stat.S_IMODE(stored.stat().st_mode) == 0o600
-    assert make_database(another)
-    before = (another / NAME).read_bytes()
-    assert before == stored.read_bytes()
-    command = [sys.executable, "-m", "prefect", "server", "database", "upgrade", "-y"]
-    subprocess.run(command, env={**os.environ, "PREFECT_HOME": str(another)}, check=True, capture_output=True)
-    assert (another / NAME).read_bytes() == before, "Prefect finds nothing left to migrate"
-
-
-def listing() -> dict[Path, tuple[int, int]]:
-    """Size and time of the last change of every installed file; not of the interpreter's own, of modules of other tests too."""
-    files = [path for path in PACKAGES.rglob("*") if path.is_file() and path.suffix != ".pyc"]
-    return {path: (path.stat().st_size, path.stat().st_mtime_ns) for path in files}
-
-
-@pytest.mark.slow
-def test_a_start_copies_the_pages_of_the_server_into_the_state_folder_and_nothing_into_the_packages(
-    tmp_path: Path,
-) -> None:
-    before = listing()
-    with orchestrator.served(tmp_path / "orchestrator", TUMBLELINE_STATE=str(tmp_path / "state")) as running:
-        status, page = running.ask("/")
-    assert (status, "<html" in page.lower()) == (200, True)
-    assert {path.parent.name for path in (tmp_path / "state").rglob("index.html")} == {"v1", "v2"}
-    assert listing() == before

@@ -64,7 +64,6 @@ def tumbleline(*words: object, **environment: str) -> subprocess.CompletedProces
 
 
 def worker_command(line: Orchestrator, *words: str) -> tuple[int, str]:
-    """Status and message of a command to the worker of the station."""
     command = [sys.executable, "-m", "pipelines.orchestrator.worker", words[0], "--station", "line-1", *words[1:]]
     done = subprocess.run(command, cwd=ROOT, env=line.environment, capture_output=True, text=True, check=False)
     return done.returncode, done.stderr

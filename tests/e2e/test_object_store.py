@@ -149,6 +149,4 @@ def test_an_address_that_is_none_is_one_message_and_places_have_the_names_of_pat
     with pytest.raises(ArchiveUnusable, match="address 'nosuch://bucket/x' cannot be used") as problem:
         Archive("nosuch://someone:secret@bucket/x")
     place = ObjectPath(None, "bucket/a/b.json", "s3", "s3://k:secret@bucket/a")
-    assert (place.name, place.stem, place.suffix) == ("b.json", "b", ".json")
-    assert str(place.parent / "c") == "s3://bucket/a/c"
     assert "secret" not in f"{problem.value} {place!r}"

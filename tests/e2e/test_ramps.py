@@ -42,7 +42,6 @@ def test_ramps_go_from_end_to_end_and_a_ramp_that_stays_short_counts_as_worse():
 
 
 def ramp_recipe(folder: Path, name: str = "ramp") -> str:
-    """The small recipe on two ramps."""
     base = Path(recipe_file(folder, ("temperatures_C = [0.0, 50.0]\n", ""), ('["A1", "A2", "A3"]', '["A1"]')))
     text = base.read_text(encoding="utf-8").replace('poses = "nine"', 'poses = "twelve"')
     poses = [*range(1, 13), *range(12, 0, -1)]

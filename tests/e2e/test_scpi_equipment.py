@@ -2,27 +2,17 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-import numpy as np
 import pytest
 from each import each
 from root_process import ROOT
 from small_station import lot_of
 
 from inertial.dynamics.sine_fit import fit_tone
-from pipelines.archive import Archive
-from pipelines.capture.capture import capture
-from pipelines.jobs.recipes import load_recipe
-from pipelines.procedures import PROCEDURES, parts_of
-from pipelines.procedures.recorded import nominal_device, procedure_record
-from pipelines.schedule.steps import steps
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.fault import FaultOrder
-from schemas.lot import Lot, Unit
-from schemas.progress import silent
 from schemas.station import load_station, with_faults
 from schemas.station_devices import Device, Equipment
 from stations import open_station
@@ -41,7 +31,6 @@ SHOCK_MACHINE = {"shock_machine": Device(profile="modbus_shock", device_id=60, l
 
 @contextmanager
 def opened(equipment: dict[str, Device], *faults: str, units: int = 1) -> Iterator[Station]:
-    """The built-in station with this equipment, and faults of it."""
     config = load_station().model_copy(update={"equipment": Equipment(**equipment)})
     orders = [FaultOrder(kind=kind) for kind in faults]
     with open_station(with_faults(config, orders), lot_of(units), roles=[*equipment]) as station:
@@ -117,30 +106,6 @@ def test_errors_of_earlier_users_of_a_supply_are_not_those_of_our_orders_unless_
     _, endless = supply_with([-350] * 1000)
     with pytest.raises(StationRefused, match="queue is not empty, an end is needed"):
         endless.set_voltage(3.0)
-
-
-def test_a_sweep_runs_on_the_generator(tmp_path: Path) -> None:
-    path = tmp_path / "recipe.toml"
-    path.write_text(
-        'name = "generator"\ndevice = "SF1500"\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n[[procedures]]\n'
-        'kind = "sweep"\nfrequencies_hz = [40.0, 80.0, 120.0, 160.0, 320.0, 640.0, 900.0, 1300.0, 2000.0]\n'
-        "nominal_scale = 0.007\nlevel_g = 2.0\nrecord_s = 0.05\ncycles = 4\n"
-    )
-    recipe = load_recipe(str(path))
-    lot = Lot(units=[Unit(serial="G1", slot=0)], device="SF1500", seed=3)
-    records = Archive(tmp_path / "a").capture("one")
-    config = load_station().model_copy(update={"equipment": Equipment(**EXCITER)})
-    with open_station(config, lot, roles=["exciter"]) as station:
-        capture(station, recipe, lot, records, progress=silent, events=records.events)
-    readings = records.gathered("readings")
-    part, plan = parts_of(recipe)[0], steps(recipe)
-    taken = [
-        procedure_record(k, step.order, [next(records.samples([k]))], readings[readings["record"] == k])
-        for k, step in enumerate(plan)
-    ]
-    points = PROCEDURES["sweep"].reduce(part, taken, nominal_device(readings))
-    assert np.all(np.isfinite(points["value"]))
-    assert points["value"].iloc[3] == pytest.approx(0.007, rel=0.02)
 
 
 TROUBLE = {

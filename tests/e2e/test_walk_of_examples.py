@@ -28,7 +28,6 @@ WITH_A_DEVICE = ("station bring-up",)
 """Examples for which a device must be there: tests/e2e/test_bring_up.py."""
 
 LONG = ("demo",)
-"""Examples that take minutes."""
 
 DIRECT = {"run", "investigate"}
 """Commands that are given with --direct: the orchestrator is tested elsewhere."""
@@ -150,15 +149,3 @@ def test_an_example_that_serves_ends_by_ctrl_c(example: str, world: tuple[Path, 
     assert process.returncode in {DONE, INTERRUPTED}, err
     assert "Traceback" not in err
     assert "defect" not in err
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
-@pytest.mark.parametrize("example", [one for one in ALL if any(word in one for word in LONG) and not kept(one)])
-def test_a_long_example_ends_with_a_result(example: str, tmp_path: Path, monkeypatch) -> None:
-    _at_home(monkeypatch, tmp_path)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "stdin", io.StringIO("\n" * 20))
-    done = command(words_of(example, {"/mnt": "."}))
-    assert done.returncode in {DONE, PART_FAILED}, done.stderr
-    assert "defect" not in done.stderr

@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from itertools import cycle, product
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -37,7 +37,6 @@ def went(*words: object, allowed: tuple[int, ...] = (0,)) -> tuple[str, str]:
 
 
 def pasted(text: str, archive: Path, *, also_quoted: bool = False) -> int:
-    """Give every command that a text prints; their number."""
     lines = printed_commands(text)
     if also_quoted:
         lines += [[*shlex.split(line), "--archive", str(archive)] for line in re.findall(r"'tumbleline ([^']*)'", text)]
@@ -81,7 +80,6 @@ def test_a_procedure_is_planned_measured_reported_and_says_what_it_lacks(recipe:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_next_measurement")
 def test_the_quickest_recipe_passes_and_its_next_lines_can_be_pasted(tmp_path: Path) -> None:
     assert (len(RECIPES), len(PROCEDURES), len(STATIONS)) >= (5, 12, 8)  # there is something to walk
     assert set(QUICK) < set(map(named, PROCEDURES))
@@ -92,13 +90,6 @@ def test_the_quickest_recipe_passes_and_its_next_lines_can_be_pasted(tmp_path: P
         text, _ = went("export", "latest", "--format", form, "--units", "LN-01", "--archive", tmp_path)
         assert "256000 LSB" in text
         assert "certificate LN-01/1" in text
-
-
-@pytest.mark.slow
-@each([*zip(RECIPES, cycle(STATIONS), strict=False)], lambda case: " on ".join(map(named, case)))
-def test_a_recipe_can_be_planned_on_one_station_or_is_refused_by_name(case: tuple[Path, Path]) -> None:
-    """Those of procedures on the built-in station: tests/e2e/test_pages.py."""
-    planned_or_refused(*case)
 
 
 @pytest.mark.slow

@@ -31,7 +31,6 @@ def hardware(config: StationConfig, patience: dict[str, object] | None = None, *
 
 @contextmanager
 def on_a_serial_line(slots=(), devices=None, **patience):
-    """A plant, its serial line, and a station on it."""
     config = station_with(**(devices or {}))
     plant = plant_of(config, lot_of(1))
     with serial_line() as line, SerialPlantServer(plant, line.device):
@@ -41,7 +40,6 @@ def on_a_serial_line(slots=(), devices=None, **patience):
 
 
 ONCE = {"read_attempts": 1, "timeout_s": PATIENCE_S}
-"""A station that asks once and has much patience."""
 
 
 def wire_of(station):
@@ -200,7 +198,3 @@ def test_lines_settings_and_carriers_that_cannot_be_are_told_by_name(tmp_path):
         real = hardware(station_with(), once, link="rtu", serial=line.host, baud=19200, parity="even")
         with open_devices(real, ()) as station, pytest.raises((LinkLost, StationTimeout), match=line.host):
             station.chamber.temperature()
-    where = {"link": "tls", "host": "127.0.0.1", "port": 1, "ca_file": str(Authority(tmp_path).file)}
-    real = hardware(station_with(chamber="espec_p300"), **where)
-    with pytest.raises(RecipeInvalid, match="is carried by ascii"), open_devices(real, ()):
-        pass

@@ -1,7 +1,5 @@
 """The workbench on an unusual archive in a browser: findings of an audit, and scripts in every name."""
 
-import csv
-import io
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlencode
@@ -60,28 +58,6 @@ def test_a_finding_of_the_audit_leads_to_the_values_that_it_is_drawn_from(bench:
         one.ready()
         assert one.findings() == []
         assert one.errors == [] == one.outside
-
-
-def test_every_table_of_the_audit_is_there_as_numbers(bench: Served, browser: Any) -> None:
-    with tab(browser, bench.address) as one:
-        one.open("/audit?until=2024-01-10")
-        for region, last in (("Yield", "interval_high"), ("Stations and slots compared", "p")):
-            table = one.page.locator(f"section:has([aria-label='{region}'])")
-            address = str(table.locator("a:text-is('CSV')").get_attribute("href"))
-            rows = list(csv.DictReader(io.StringIO(one.page.request.get(bench.address + address).text())))
-            assert last in rows[0]
-            shown = table.locator("tbody tr").count()
-            assert 1 <= shown <= len(rows)  # the page shows the first, the file holds all
-            cells = [cell.strip() for cell in table.locator("tbody tr").first.locator("td").all_inner_texts()]
-            if region == "Yield":
-                assert cells[0] == rows[0]["of"]
-                assert cells[2] == rows[0]["total"]
-                assert float(cells[3]) == pytest.approx(100.0 * float(rows[0]["interval_value"]), abs=0.051)
-            else:
-                assert {row["by"] for row in rows} <= {"station", "slot"}
-                assert cells[2] == rows[0]["by"] + "s"
-                assert float(cells[5]) == pytest.approx(100.0 * float(rows[0]["comparison_effect"]), abs=0.051)
-        assert one.errors == []
 
 
 def test_no_script_in_any_name_runs(bench: Served, browser: Any) -> None:

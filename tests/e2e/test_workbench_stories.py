@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 from browser import ROOT, Tab, served, tab, until
-from capture_double import recipe_file
 from served_station import FAST, modbus_station, short_recipe_file, station_file
 from served_station import served as served_station
 from small_station import lot_of
@@ -37,6 +36,11 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         one.page.select_option("select[name=source]", str(folder / "dwells.parquet"))
         one.sees(".verdict")
         assert "; missing: third_order" in one.page.inner_text(".verdict")
+        order = one.page.evaluate(
+            """() => [".verdict", "[data-name=effect-0]", "[data-add]", ".command"].map(
+                (s) => document.querySelector(s).getBoundingClientRect().top)"""
+        )
+        assert order == sorted(order)
         one.press("text=as the fresh measurement")
         one.sees("[data-version='1']")
         assert one.page.locator("a[data-add=third_order]").first.inner_text() == "Add third_order"
@@ -64,53 +68,14 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         assert one.outside == [] == one.errors
 
 
-def begun(one: Tab, recipe: str | Path, *serials: str, fault: str = "") -> None:
+def begun(one: Tab, recipe: str | Path, *serials: str) -> None:
     """A lot that is started on the page of the operator, and asks for its units."""
     one.page.select_option("select[name=recipe]", str(recipe))
-    if fault:
-        one.page.fill("input[name=fault]", fault)
     for slot, serial in enumerate(serials):
         one.page.fill(f"#slot-{slot}", serial)
         one.page.press(f"#slot-{slot}", "Enter")
     one.press("text=Start the lot")
     one.sees(".question")
-
-
-def test_a_lot_with_an_open_door_is_measured_from_two_browsers(tmp_path: Path, browser: Any) -> None:
-    folder = tmp_path / "bench"
-    folder.mkdir()
-    recipe = recipe_file(folder)
-    with (
-        served(tmp_path / "archive", folder) as server,
-        tab(browser, server.address) as one,
-        tab(browser, server.address) as two,
-    ):
-        one.open("/operator")
-        begun(one, recipe, "A1", "A2", "A" * 64, fault="door:at_s=300")
-        assert "seat the units" in one.page.inner_text(".question").lower()
-        two.open("/operator")
-        two.sees("[data-answer='go']")
-        stale = two.page.evaluate(
-            """async () => { const b = document.querySelector("[data-answer=go]");
-            const proof = localStorage.getItem("tumbleline-change-proof");
-            const headers = { "content-type": "application/json", "x-change-proof": proof };
-            const send = () => fetch(b.dataset.act, { method: "POST", headers,
-                body: JSON.stringify({ number: b.dataset.number, answer: "go" }) });
-            return [(await send()).status, (await send()).status]; }"""
-        )
-        assert stale == [200, 409]
-        until(lambda: "door" in one.page.inner_text("main"), "the open door is told in words")
-        assert one.findings() == []
-        until(
-            lambda: one.page.locator("[data-phase=asks], [data-phase=stopped], [data-phase=failed]").count(),
-            "it needs a hand",
-        )
-        one.shot(tmp_path, "fault")
-        server.end()  # the lot's process does not need the server
-        server.begin()
-        two.open("/operator")
-        assert "door" in two.page.inner_text("main")
-        assert two.page.locator(".tile").count() >= 3
 
 
 def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_station(
@@ -140,6 +105,8 @@ def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_st
                 begun(one, recipe, "B1")
                 one.shot(tmp_path, "two-stations")
             kept = {path: path.read_bytes() for path in tmp_path.glob("archive/captures/*/[0-9]*/record.json")}
+            server.end()  # a paused lot does not need the server
+            server.begin()
             with tab(browser, server.address) as again:  # the browser was closed, and is opened again
                 again.open("/operator")
                 again.sees("[data-phase=paused]")
