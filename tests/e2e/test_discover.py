@@ -103,8 +103,9 @@ def test_refusals_say_what_is_there(words: str, folder: Path) -> None:
 
 
 def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
-    made = Archive(str(tmp_path / "archive"))
-    made.prepare()
+    assert "--lots takes no name" in refused("demo", "pendulous_mass", "--lots", "60")
+    Archive(str(tmp_path / "archive")).prepare()
+    assert "has files already" in refused("demo", "--lots", "400", "--folder", tmp_path)
     assert "no run with dwells, thirty at least" in refused("discover", "--archive", tmp_path / "archive")
     assert "holds no archive" in refused("discover", "--archive", tmp_path / "nothing")
     assert "there is no file" in refused("attributes", "add", tmp_path / "u.csv", "--archive", tmp_path / "archive")
@@ -112,18 +113,6 @@ def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
     add = ("attributes", "add", tmp_path / "u.csv", "--archive", tmp_path / "archive")
     assert "no column 'serial'" in refused(*add)
     assert "--by is 'lot'" in refused(*add, "--by", "lot")
-
-
-def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: Path) -> None:
-    assert "--lots takes no name" in refused("demo", "pendulous_mass", "--lots", "60")
-    made = write_lots(tmp_path, Line(6, units=2), 3)
-    status, out, err = given("discover", "--archive", made.folder)
-    assert status == 0, err
-    assert "3 lots: a discovery needs at least 30" in " ".join(out.split())
-    document = document_of("discover", "--archive", made.folder)
-    assert document["pooled"]["lots"] == 3
-    assert document["reach"] == []
-    assert "has files already" in refused("demo", "--lots", "400", "--folder", folder)
 
 
 @pytest.mark.slow

@@ -17,7 +17,6 @@ from pipelines.chain.runner import Runner
 from pipelines.inquiry.followup import follow_up
 from pipelines.inquiry.inquiry import FOLLOW_UP, FollowUp, begin
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import minutes
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.event import MemoryLog
 from schemas.poses import SoakPart
@@ -156,16 +155,6 @@ def test_the_emergency_stop_ends_the_wait_with_power_and_a_reader_that_cannot_sw
         with pytest.raises(StationRefused, match="no register 'power', one is needed"):
             capture(station, recipe_with_power_off(), lot, MemorySink(), progress=quiet_progress)
         assert station.clock.now() < 1.0
-
-
-def test_the_time_without_power_is_in_the_minutes_of_the_recipe_and_each_pose_needs_one():
-    station = station_of()
-    recipes = recipe_with_power_off(), recipe_with_power_off((0.0, 0.0, 0.0))
-    long, short = (minutes(steps(recipe), station, recipe).total for recipe in recipes)
-    assert long - short == pytest.approx(OFF_S / 60.0, abs=0.02)
-    soak = {"temperature_C": 25.0, "poses": [1, 1], "verification": [], "off_s": [5.0]}
-    with pytest.raises(ValueError, match="soak 1 has 1 times without power for 2 poses"):
-        Recipe.model_validate({**short_recipe(poses=1).model_dump(), "soaks": [soak]})
 
 
 UP, DOWN = (0.0, 0.0), (math.pi, 0.0)

@@ -129,9 +129,10 @@ def test_parts_of_the_planned_time_are_told_apart_with_the_pace_of_the_file_and_
     config = station_of().model_copy(update={"simulation": None})  # hardware takes its pace from the station's file
     fast = config.model_copy(update={"pace": config.pace.model_copy(update={"ramp_K_per_min": 10.0, "lag_s": 60.0})})
     assert minutes(steps(recipe), fast, recipe).soaks < minutes(steps(recipe), config, recipe).soaks
-    soak = {"temperature_C": 25.0, "poses": [1], "verification": [], "waits_s": [1.0, 2.0]}
-    with pytest.raises(ValueError, match="soak 1 has 2 waits for 1 poses"):
-        Recipe.model_validate({**short_recipe(1).model_dump(), "soaks": [soak]})
+    soak = {"temperature_C": 25.0, "poses": [1], "verification": []}
+    for key, said in (("waits_s", "2 waits"), ("off_s", "2 times without power")):
+        with pytest.raises(ValueError, match=f"soak 1 has {said} for 1 poses"):
+            Recipe.model_validate({**short_recipe(1).model_dump(), "soaks": [{**soak, key: [1.0, 2.0]}]})
 
 
 def ordered_recipe():
