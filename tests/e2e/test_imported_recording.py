@@ -26,20 +26,10 @@ DRIFTING = Recording(60, "white 280, B 30", warm_up=3000.0, sensor=11)
 REFERENCES = """\
 name = "lab-2"
 
-[[reference]]
-id = "G-01"
-what = "local gravity"
-certificate = "G-2025-7"
-due = 2035-05-02
-
-[[reference]]
-id = "PT-7"
-what = "temperature"
-certificate = "K-26-118"
-due = 2027-03-02
-U = 0.1
-k = 2.0
-unit = "K"
+reference = [
+    { id = "G-01", what = "local gravity", certificate = "G-2025-7", due = 2035-05-02 },
+    { id = "PT-7", what = "temperature", certificate = "K-26-118", due = 2027-03-02, U = 0.1, k = 2.0, unit = "K" },
+]
 
 [uncertainty]
 grade_source = "certificates"

@@ -1,4 +1,4 @@
-"""One command for a file of another system: recognised, imported, fitted, judged; what it decided can be pasted."""
+"""One command for a file of another system: recognised, imported, fitted, judged, six faces too; it can be pasted."""
 
 import shlex
 from pathlib import Path
@@ -218,24 +218,10 @@ def test_labels_of_a_file_name_its_faces(rng: np.random.Generator, *, moves: boo
     assert command.startswith(document_of("inspect", path)["command"].split(" --set gaps")[0])
 
 
-TURNED = 9.81 * np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
-
-
-def back_to_back(count: int = 400) -> np.ndarray:
-    rng = np.random.default_rng(1)
-    return np.repeat(TURNED, count, 0) * 1.01 + [0.1, -0.05, 0.02] + 0.02 * rng.normal(size=(6 * count, 3))
-
-
-def test_positions_logged_back_to_back_are_faces_by_their_own_names_and_an_array_of_three_is_a_triad(
-    tmp_path, monkeypatch
-):
-    """Their labels were those of dwells, which no import of such a record has."""
-    monkeypatch.chdir(tmp_path)
-    table = np.column_stack([0.01 * np.arange(2400), back_to_back()])
-    np.savetxt("six.csv", table, delimiter=",", header="time,ax,ay,az", comments="", fmt="%.5f")
-    done = command(["improve", "six.csv"])
+def test_positions_logged_back_to_back_are_faces_and_an_array_of_three_is_a_triad(rng: np.random.Generator) -> None:
+    done = command(["improve", six_labelled(rng, "six.csv", moves=False)])
     assert done.returncode in {0, 1}, done.stderr
-    assert "x: bias 0.10" in done.stdout
-    outputs = back_to_back(30)
+    assert "x: bias 0.30" in done.stdout
+    outputs = 9.81 * np.repeat(SIX, 30, axis=0) + 0.02 * rng.normal(size=(180, 3))
     columns = {f"accelerometer_m_s2[{k}]": outputs[:, k] for k in range(3)} | {"gyro_rad[0]": np.arange(180.0)}
     assert triad(columns, {}).names == tuple(f"accelerometer_m_s2[{k}]" for k in range(3))

@@ -44,24 +44,17 @@ def planned(*words: object) -> dict[str, Any]:
     return document_of("plan", *words, status=0)
 
 
-def faces_in(folder: Path) -> Path:
-    path = folder / "faces.toml"
+@pytest.fixture
+def faces(tmp_path: Path) -> Path:
+    path = tmp_path / "faces.toml"
     path.write_text(RECIPE, encoding="utf-8")
     path.with_name("own.toml").write_text(LIMITS.format(figure="residual_rms_ug"), encoding="utf-8")
     return path
 
 
-@pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    return {row["effect"]: row for row in planned(faces_in(tmp_path_factory.mktemp("seen")))["effects"]}
-
-
-@pytest.fixture
-def faces(tmp_path: Path) -> Path:
-    return faces_in(tmp_path)
-
-
-def test_plan_says_for_every_effect_whether_six_faces_see_it_what_hides_it_and_its_floor(seen: dict[str, Any]) -> None:
+def test_plan_says_for_every_effect_whether_six_faces_see_it_and_for_every_coefficient_its_error(faces: Path) -> None:
+    document = planned(faces, "--noise", "25,0")
+    seen = {row["effect"]: row for row in document["effects"]}
     square, cross, shaken = seen["second_order"], seen["cross_coupling"], seen["vibration_rectification"]
     assert (square["seen"], square["why"]) == (True, "")
     assert square["left"] == pytest.approx(0.82, abs=0.01)
@@ -72,6 +65,12 @@ def test_plan_says_for_every_effect_whether_six_faces_see_it_what_hides_it_and_i
     # K2·fx² is 1 in two of six faces and 0 in the others
     assert square["floor_size_ug"] == pytest.approx(square["floor_ug"] / 3**0.5, rel=1e-3)
     assert shaken["floor_size_ug"] < 1e-3 * shaken["floor_ug"]
+    rows = {(r["effect"], r["axis"]): r for r in document["coefficients"] if r["effect"] != "misalignment"}
+    white = document["dwell_error_ug"]["white"]
+    assert white == pytest.approx(25.0 / 20.0**0.5)
+    # six faces: the bias from six dwells, the scale from the two along the axis
+    assert rows["bias", "x"]["uncertainty_ug"] == pytest.approx(white / 6.0**0.5, rel=1e-6)
+    assert rows["scale", "z"]["uncertainty_ug"] == pytest.approx(white / 2.0**0.5, rel=1e-6)
 
 
 def test_plan_marks_what_would_have_to_be_larger_than_it_ever_is_and_adds_up_its_minutes() -> None:
@@ -89,16 +88,6 @@ def test_plan_refuses_a_model_that_the_recipe_cannot_determine_with_what_is_miss
     message = refused("plan", faces)
     assert "cross_coupling cannot be identified: β in 90° steps makes" in message
     assert "add poses at β = 45°" in message
-
-
-def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces: Path) -> None:
-    document = planned(faces, "--noise", "25,0")
-    rows = {(r["effect"], r["axis"]): r for r in document["coefficients"] if r["effect"] != "misalignment"}
-    white = document["dwell_error_ug"]["white"]
-    assert white == pytest.approx(25.0 / 20.0**0.5)
-    # six faces: the bias from six dwells, the scale from the two along the axis
-    assert rows["bias", "x"]["uncertainty_ug"] == pytest.approx(white / 6.0**0.5, rel=1e-6)
-    assert rows["scale", "z"]["uncertainty_ug"] == pytest.approx(white / 2.0**0.5, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The package for Python, as a scientist uses it: truths from physics, answers and errors as those of the commands."""
+"""The package for Python, as a scientist uses it, and its notebooks: truths from physics, answers as of the commands."""
 
 import inspect
 import json

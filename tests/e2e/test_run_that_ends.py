@@ -1,4 +1,4 @@
-"""A run with ``[stop]``: it ends when its units are known, says so wherever the run is shown, and is run again as it was."""
+"""Recipes with ``[stop]``, which end when their units are known, and with ``[prior]``, whose family counts."""
 
 from pathlib import Path
 from types import SimpleNamespace

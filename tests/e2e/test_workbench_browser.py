@@ -1,4 +1,4 @@
-"""The workbench in a real browser: pages that are drawn, a hidden effect found, names that stay names, a server that dies."""
+"""The workbench in a real browser: pages that are drawn, on narrow screens, of unusual archives, and of a server that dies."""
 
 import os
 import signal
@@ -6,12 +6,14 @@ import urllib.parse
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import pytest
 from browser import Served, Tab, served, tab, until
 from capture_double import recipe_file, small_run
 from in_process import document_of, text_of
 from long_suites import mostly_slow
+from unusual_archives import SCRIPT, addresses, unusual_archive
 
 FEW = ("/unit?run=latest", "/station")
 PAGES = (*FEW, "/units", "/run?run=latest", "/upload", "/missing", "/operator", "/models", "/plan", "/audit")
@@ -185,3 +187,139 @@ def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, bro
             lambda: rows.count() >= 1 and all("a2" in row.lower() for row in rows.all_inner_texts()),
             "the search answers",
         )
+
+
+PHONE, SCREEN = (390, 844), (1440, 900)
+NARROW_PAGES = (
+    "/units", "/run", "/unit", "/missing", "/two-models", "/upload", "/operator", "/models", "/plan?only=unseen", "/station",
+    "/audit",
+)  # fmt: skip
+OUTSIDE = """() => [...document.querySelectorAll("main *, header *")]
+    .filter((e) => e.checkVisibility() && !e.closest(".scroll, svg, .hidden, .skip"))
+    .filter((e) => e.getBoundingClientRect().right > innerWidth + 1)
+    .map((e) => `${e.tagName} ${e.className} ${e.textContent.trim().slice(0, 40)}`)"""
+
+
+@pytest.fixture(scope="module")
+def narrow(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    top = tmp_path_factory.mktemp("screens")
+    small_run(top, {"A2": "dead"})
+    (top / "narrow").mkdir()
+    recipe_file(top / "narrow")
+    with served(top / "archive", top / "narrow") as one:
+        yield one
+
+
+@pytest.mark.slow
+def test_on_a_narrow_screen_nothing_is_cut_and_the_whole_menu_is_seen(narrow: Served, browser: Any) -> None:
+    with tab(browser, narrow.address, size=PHONE) as one:
+        for path in NARROW_PAGES:
+            one.open(path)
+            assert one.page.evaluate(OUTSIDE) == [], path
+            assert one.page.evaluate("() => document.documentElement.scrollWidth") <= PHONE[0], path
+            links = one.page.locator(".bar nav a")
+            assert links.count() >= 9
+            assert all(link.bounding_box()["x"] + link.bounding_box()["width"] <= PHONE[0] for link in links.all())
+        assert one.errors == []
+
+
+@pytest.mark.slow
+def test_a_serial_is_checked_at_its_scan_and_a_bell_calls_the_operator_of_a_lot_that_is_drawn(
+    narrow: Served, browser: Any
+) -> None:
+    with tab(browser, narrow.address) as one:
+        one.open("/operator")
+        one.press("[data-bell]")
+        assert one.page.evaluate("() => document.body.dataset.rung") == "1"  # so that one hears how it sounds
+        for slot, serial in ((0, "S1"), (1, "S1")):
+            one.page.fill(f"#slot-{slot}", serial)
+            one.page.press(f"#slot-{slot}", "Enter")
+            until(
+                lambda: one.page.evaluate("() => document.activeElement.id") == "slot-1",
+                "the second slot has the focus",
+            )
+        until(
+            lambda: "'S1' is in slot 0 already" in one.page.inner_text(".tile:nth-child(2)"),
+            "the slot says what is wrong",
+        )
+        assert one.page.get_attribute("#slot-1", "aria-invalid") == "true"
+        one.page.fill("#slot-1", "S2")
+        one.page.press("#slot-1", "Enter")
+        until(lambda: one.page.evaluate("() => document.activeElement.id") == "slot-2", "the next slot has the focus")
+        assert one.page.locator(".tile [role=alert]:visible").count() == 0
+        assert one.page.locator("#faults option[value^=door]").count() == 1
+        one.page.select_option("select[name=recipe]", index=1)
+        one.press("text=Start the lot")
+        one.sees(".question")
+        until(lambda: one.page.evaluate("() => document.body.dataset.rung") == "2", "the bell rings")
+        assert one.page.title().startswith("Your turn")
+        one.press("[data-answer='go']")
+        one.sees("[data-name=station][data-drawn]")
+        assert [error for error in one.errors if "422" not in error] == []
+
+
+# without a browser, with broken runs and 500 units: tests/unit/pipelines/workbench/test_unusual_archives.py
+
+
+@pytest.fixture(scope="module")
+def unusual(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    top = tmp_path_factory.mktemp("unusual")
+    unusual_archive(top / "archive")
+    with served(top / "archive", top / "unusual") as one:
+        yield one
+
+
+def run_of(unusual: Served, start: str) -> str:
+    return next(path.name for path in (unusual.archive / "runs").iterdir() if path.name.startswith(start))
+
+
+def main_text(one: Tab) -> str:
+    return str(one.page.inner_text("main"))
+
+
+@pytest.mark.slow
+def test_a_finding_of_the_audit_leads_to_the_values_that_it_is_drawn_from(unusual: Served, browser: Any) -> None:
+    with tab(browser, unusual.address) as one:
+        one.open("/audit?until=2024-01-10")
+        one.sees("details.finding")
+        with_chart = one.page.locator("details.finding:has([data-figure])")
+        assert with_chart.count() >= 1
+        chosen = with_chart.first
+        name = chosen.get_attribute("data-finding")
+        chosen.locator("summary").click()
+        until(lambda: chosen.locator("[data-drawn]").count() == 1, "the evidence is drawn")
+        chosen.locator("text=Address of this finding").click()
+        one.ready()
+        opened = one.page.locator("details.finding[open]")
+        assert opened.count() == 1  # the address opens this finding, and no other
+        assert opened.get_attribute("data-finding") == name
+        until(lambda: opened.locator("[data-drawn]").count() == 1, "the evidence is drawn from its address")
+        numbers = one.page.request.get(
+            unusual.address + str(opened.locator("a:text-is('CSV')").get_attribute("href"))
+        ).text()
+        subject = str(name).split(".")[1]
+        # a chart that the page draws again has no points for a moment
+        points = "plot => (plot._fullData ?? []).reduce((n, t) => n + t.x.length, 0)"
+        until(lambda: opened.locator("[data-drawn]").evaluate(points) >= 2, "the points of the evidence are drawn")
+        assert len(numbers.splitlines()) > 2
+        assert subject in main_text(one)
+        opened.locator("table a").first.click()  # the run of the finding
+        until(lambda: "/run?" in one.href, "the run of the finding is opened")
+        one.ready()
+        assert one.findings() == []
+        assert one.errors == [] == one.outside
+
+
+@pytest.mark.slow
+def test_no_script_in_any_name_runs(unusual: Served, browser: Any) -> None:
+    pages = [*addresses(run_of(unusual, "named-")), "/operator?" + urlencode({"station": ""}), "/" + SCRIPT]
+    with tab(browser, unusual.address) as one:
+        for path in pages:
+            one.page.goto(unusual.address + path)
+            until(lambda: one.page.evaluate("() => Boolean(document.body.dataset.ready)"), path)
+            if path.startswith(("/unit?", "/run?")):
+                one.ready()
+                assert one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth") <= 0, path
+            assert one.page.evaluate("() => window.ran") is None, path
+            assert one.page.locator("main img, main script").count() == 0, path
+        assert one.outside == []
