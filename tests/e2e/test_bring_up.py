@@ -64,8 +64,7 @@ def test_the_simulated_device_of_every_family_passes(name, tmp_path):
             assert plant.fixture.chamber.set_point == 23.0
         assert {said[what] for what in wanted} == {"held"}, said
         assert found.findings.changes == {}
-    recording = read_frames(tmp_path / "frames.jsonl")
-    assert len(recording.exchanges) > 20
+    assert len(read_frames(tmp_path / "frames.jsonl").exchanges) > 20
 
 
 @each([libmodbus_server, pymodbus_server])
@@ -259,7 +258,6 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(what, nam
         assert not axis or plant.outer.encoder(plant.now) < GOALS_DEG[word] - 0.1
     recording = read_frames(frames)
     assert recording.remark == ""
-    assert len(recording.exchanges) > 10
 
 
 def test_the_command_writes_page_document_and_recording(tmp_path, monkeypatch):

@@ -213,12 +213,10 @@ def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path,
     table = tracked(run, rng)
     words = ("--set", "turn_on=2000", "--filter", "butterworth:12")
     _, whole = corrected(run, table, *words)
-    document, first = corrected(run, table.iloc[:7000], *words, "--state", "kept.json")
-    assert document["state"] == "kept.json"
-    document, second = corrected(
+    _, first = corrected(run, table.iloc[:7000], *words, "--state", "kept.json")
+    _, second = corrected(
         run, table.iloc[7000:].assign(force_x=0.0, force_y=0.6, force_z=0.8), *words, "--state", "kept.json"
     )
-    assert document["bias"]["u_last_at_limits_ug"] is None
     assert np.allclose(first[FORCES].to_numpy(), whole[FORCES].to_numpy()[:7000], atol=1e-12)
     assert np.allclose(second[FORCES].to_numpy()[:100], whole[FORCES].to_numpy()[7000:7100], atol=1e-9)
     assert second["u_bias_x_ug"].iloc[0] == pytest.approx(whole["u_bias_x_ug"].iloc[7000], rel=1e-6)

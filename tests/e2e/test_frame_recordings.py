@@ -122,7 +122,6 @@ def test_a_replayed_device_answers_as_late_and_as_silent_as_the_recorded_one(tmp
     recording = read_frames(recorded_reads(tmp_path, late_s=0.3))
     exchanges = recording.exchanges
     assert [kind_of(e) for e in exchanges] == ["read", "order", "read", "refused"]
-    assert [e.what for e in exchanges[:3]] == ["read temperature", "write set_point", "read temperature"]
     new = []
     with ReplayServer(recording, new=new.append) as server, read_by_us(server.port) as (link, profile):
         begun = time.monotonic()

@@ -82,11 +82,9 @@ def test_inspect_draws_the_record_writes_a_page_and_names_faults(record: Recordi
     Path("a.csv").write_text(frozen_file(record), encoding="utf-8")
     document = document_of("inspect", "a.csv", "--output", "a.svg", "--output", "a.html", status=0)
     assert [(fault["fault"], fault["axis"]) for fault in document["faults"]] == [("stuck_output", "z")]
-    assert [column["resolution"] for column in document["columns"]][1:] == [1.0, 1.0, 1.0]
     assert "<svg" in Path("a.svg").read_text(encoding="utf-8")
     page = Path("a.html").read_text(encoding="utf-8")
     assert "the axis is constant" in page
-    assert document["command"].replace("'", "&#39;") in page
     frame = recordings.table(recordings.counts(np.random.default_rng(11), directions=FACES, noise=20.0))
     frame["ax"] = frame["ax"].clip(-15_000, 15_000)  # an axis at the end of its range is told as clipped
     count = int((frame["ax"].abs() == 15_000).sum())  # two whole dwells, and moments of the moves
@@ -182,17 +180,6 @@ def test_positions_logged_back_to_back_are_seen_and_divided(rng: np.random.Gener
     np.testing.assert_allclose(means, truth, atol=5.0)
 
 
-def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(record: Recording) -> None:
-    Path("a.csv").write_text(frozen_file(record), encoding="utf-8")
-    told = refused_import("a.csv", *MAPPED)
-    assert "axis z is constant for" in told
-    assert f"from row {record.spans[4][0] + 1} on" in told
-    document = imported("a.csv", *MAPPED, "--set", "faulty=leave-out")
-    assert document["dwells"] == 8
-    assert [fault["fault"] for fault in document["faults"]] == ["stuck_output"]
-    assert imported("a.csv", *MAPPED, "--set", "faulty=keep")["dwells"] == 9
-
-
 def test_torn_words_are_named_and_left_out_of_the_means(record: Recording, rng: np.random.Generator) -> None:
     frame = recordings.table(record)
     clean = imported(written(frame, "clean.csv"), *MAPPED)
@@ -203,6 +190,7 @@ def test_torn_words_are_named_and_left_out_of_the_means(record: Recording, rng: 
     assert "±256 steps of its resolution" in told
     document = imported("a.csv", *MAPPED, "--set", "faulty=leave-out")
     assert document["dwells"] == clean["dwells"]
+    assert imported("a.csv", *MAPPED, "--set", "faulty=keep")["dwells"] == clean["dwells"]
     for one, other in zip(document["dwell_list"], clean["dwell_list"], strict=True):
         np.testing.assert_allclose(one["mean"], other["mean"], atol=2.0)  # 7 with the torn words
 

@@ -238,13 +238,6 @@ def test_the_level_of_an_open_loop_generator_is_reached(case: tuple[float, float
         assert recording.outputs[0].shape[1] == 3
 
 
-def test_a_level_beyond_the_exciter_and_a_missed_trigger_give_no_recording() -> None:
-    with opened(EXCITER) as station, pytest.raises((OperatorNeeded, RecordingSpoilt)):
-        station.equipment["exciter"].sine(5.0, 5.0, 2, 0.2, [0])
-    with opened(EXCITER, "missed_trigger") as station, pytest.raises(RecordingSpoilt, match="trigger"):
-        station.equipment["exciter"].sine(80.0, 1.0, 2, 0.1, [0])
-
-
 def test_the_supply_sets_measures_and_returns_to_its_nominal_voltage() -> None:
     with open_station(load_station(), lot_of(1), roles=["power_supply"]) as station:
         supply = station.equipment["power_supply"]
