@@ -251,7 +251,6 @@ PAGES = [page for page in pages.PAGES if "deploy" not in page.parts] + [ROOT / "
 BENCHMARKS = ROOT / "benchmarks" / "README.md"
 PLAN_PAGE = pages.text("docs/explanation/identifiability.md")
 PLANS = [line for block in re.findall(r"```\n(.*?)```", PLAN_PAGE, re.DOTALL) for line in block.strip().splitlines()]
-POSES, DEVICES = pages.text("docs/how-to/choose-poses.md"), pages.text("docs/how-to/add-a-device.md")
 PRINTED = re.findall(
     r"^\$ tumbleline run (deploy/recipes/procedures/\S+)$", pages.text("docs/how-to/list-procedures.md"), re.MULTILINE
 )

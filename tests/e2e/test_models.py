@@ -110,9 +110,6 @@ def test_another_file_takes_the_next_version_and_a_removed_effect_stays_in_the_h
     history = versions(read_model(Path("m.toml")))
     assert [(v.added, v.removed) for v in history] == [((), ()), (("third_order",), ()), ((), ("third_order",))]
     assert (history[-1].change.by, history[-1].change.why) == ("R", "refuted")
-    told = text_of("history", "m.toml", status=0)
-    assert "+ third_order" in told
-    assert "− third_order" in told
     assert "they need --dwells" in refused("history", "m.toml", "--output", "p.png")
 
 

@@ -1,6 +1,5 @@
 """The commands that are printed to be given next run as they are printed, in their order, whichever module prints them."""
 
-import ast
 import re
 from pathlib import Path
 
@@ -11,31 +10,11 @@ import pytest
 from capture_double import finished_run
 from in_process import document_of, given, text_of, typed_document
 from long_suites import mostly_slow
-from root_process import ROOT
 from typed_commands import printed_commands
 
 from benchmarks.truth import Run, Spec, make_run
 from pipelines.archive import Archive
 from pipelines.cli.history import removal
-
-HERE = "tests/e2e/test_next_lines.py::"
-ELSEWHERE = {
-    "discovery_text": "tests/e2e/test_discover.py::test_a_discovery_is_new_once_and_is_explained",
-    "demo_text": "tests/e2e/test_discover.py::test_the_demonstration_for_people_ends_with_a_command_that_runs",
-    "diagnosis_text": HERE + "test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines",
-    "diagnose": HERE + "test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it",
-    "investigate": HERE + "test_the_lines_after_an_investigation_name_the_judged_model",
-    "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
-    "demo": HERE + "test_the_lines_of_the_demonstration_run_by_hand",
-    "certificate_revoke": "tests/unit/pipelines/chain/test_certify.py::test_a_certificate_is_offered_where_it_would_be_given",
-    "certificate_issue": "tests/unit/pipelines/cli/test_next_commands.py::test_the_line_about_documents_names_the_archive",
-    "export": "tests/unit/pipelines/certificates/test_statement.py"
-    "::test_failed_units_are_marked_in_their_files_and_no_certificate_is_offered_for_them",
-    "plan_text": "tests/e2e/test_plan.py::test_the_line_after_a_search_measures_the_new_recipe",
-}
-"""Where the lines of a module are run that prints them after minutes only, or after several commands."""
-
-PRINTING = {"command_line", "print_next", "print_extension", "print_next_of_diagnosis", "removal"}
 
 
 @pytest.fixture(scope="module")
@@ -123,22 +102,6 @@ def test_the_lines_to_give_next_run_as_they_are_printed(module: str, kept_runs: 
         assert not [word for word in words if re.fullmatch(r"[A-Z]{3,}(-[A-Z]+)*", word)], words
         status, _, err = given(*words)
         assert status in {0, 1}, (words, err)
-
-
-def called(path: Path) -> set[str]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    return {f.id if isinstance(f, ast.Name) else f.attr for f in calls if isinstance(f, ast.Name | ast.Attribute)}
-
-
-def test_every_module_that_prints_a_command_to_give_next_is_run_by_a_test() -> None:
-    modules = {path.stem for path in (ROOT / "pipelines" / "cli").rglob("*.py") if called(path) & PRINTING} - {
-        "next_commands"
-    }
-    assert modules == set(CASES) | set(ELSEWHERE)
-    for test in ELSEWHERE.values():
-        file, name = test.split("::")
-        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8")
 
 
 def pasted(lines: list[list[str]]) -> str:

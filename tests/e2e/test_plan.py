@@ -20,7 +20,6 @@ from pipelines.chain.runner import Runner
 from pipelines.cli.next_commands import fit_refusal
 from pipelines.jobs.job import Request
 from pipelines.jobs.recipes import load_recipe
-from pipelines.planning.requirement import apart
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.recipe import Recipe
@@ -60,8 +59,6 @@ def test_plan_says_for_every_effect_whether_six_faces_see_it_and_for_every_coeff
     assert square["left"] == pytest.approx(0.82, abs=0.01)
     assert {"scale_asymmetry", "fourth_order"} <= set(square["alias"])
     assert (cross["seen"], cross["floor_ug"]) == (False, None)
-    assert "β in 90° steps" in cross["why"]
-    assert "add poses at β = 45°" in cross["why"]
     # K2·fx² is 1 in two of six faces and 0 in the others
     assert square["floor_size_ug"] == pytest.approx(square["floor_ug"] / 3**0.5, rel=1e-3)
     assert shaken["floor_size_ug"] < 1e-3 * shaken["floor_ug"]
@@ -255,9 +252,6 @@ def test_soaks_come_back_and_verification_poses_are_apart_and_measured_as_often_
     assert set(of_each.values()) == {len(base.verification) // 6 * len(base.temperatures_C)}
     assert optimal[0]["verification_dwells"] == sum(of_each.values())
     assert max(map(len, taken)) - min(map(len, taken)) <= 6
-    poses = apart(np.array([[0.0, 0.0], [180.0, 0.0]]), base.verification)
-    force = force_from_angles(*np.radians([(p.outer_deg, p.inner_deg) for p in poses]).T)
-    assert np.degrees(np.arccos((force @ force.T - 2.0 * np.eye(len(force))).max())) > 40.0
 
 
 REFUSED = {

@@ -201,7 +201,7 @@ def test_who_is_not_who_he_says_is_not_believed_by_either_side(secured, tmp_path
         pass
 
 
-def test_lines_settings_and_carriers_that_cannot_be_are_told_by_name(tmp_path):
+def test_lines_settings_and_carriers_that_cannot_be_are_told_by_name():
     nowhere = hardware(station_with(), link="rtu", serial="/dev/none", baud=19200)
     with open_devices(nowhere, ()) as station, pytest.raises(LinkLost, match="/dev/none"):
         station.chamber.temperature()

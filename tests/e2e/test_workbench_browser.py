@@ -1,17 +1,15 @@
 """The workbench in a real browser: pages that are drawn, on narrow screens, of unusual archives, and of a server that dies."""
 
-import os
 import signal
 import urllib.parse
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
 import pytest
 from browser import Served, Tab, served, tab, until
 from capture_double import recipe_file, small_run
-from in_process import document_of, text_of
+from in_process import document_of
 from long_suites import mostly_slow
 from unusual_archives import SCRIPT, addresses, unusual_archive
 
@@ -31,14 +29,6 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     folder.mkdir()
     with served(top / "archive", folder) as one:
         yield one
-
-
-@pytest.fixture(scope="module")
-def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where pictures are kept: TUMBLELINE_PICTURES, else the folder of the run."""
-    folder = Path(os.environ.get("TUMBLELINE_PICTURES") or tmp_path_factory.mktemp("pictures"))
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 @pytest.mark.parametrize(
@@ -68,33 +58,6 @@ def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybod
         until(lambda: "has read access only" in one.page.inner_text("main"), "the page says why nothing begins")
 
 
-@pytest.mark.slow  # what may be released: tests/unit/pipelines/rerun/test_whatif.py
-def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
-    bench: Served, browser: Any, pictures: Path
-) -> None:
-    place = bench.folder / "models" / "cubic.toml"
-    place.parent.mkdir(exist_ok=True)
-    text_of("extend", place, "third_order", "--reason", "a trial", status=0)
-    with tab(browser, bench.address) as one:
-        one.open("/models?model=cubic")
-        assert "+ third_order" in one.page.inner_text("[aria-label=Versions]")
-        one.page.fill("input[name=reason]", "no evidence yet")
-        one.press("form[data-post='/models/release'] button")
-        until(lambda: "a what-if is needed" in one.page.inner_text("main"), "a release without evidence is refused")
-        one.press("[data-evaluate]")
-        one.sees("[data-whatif=new]")
-        verdict = one.page.inner_text(".verdict")
-        assert "No better" in verdict  # 3 calibrations, nothing hidden in them
-        one.shot(pictures, "models")
-        one.page.fill("input[name=reason]", "it is no better")
-        one.press("form[data-post='/models/release'] button")
-        until(lambda: "a better model is needed" in one.page.inner_text("main"), "a worse model is refused")
-        assert one.findings() == []
-        assert one.outside == []
-    assert list((bench.archive / "whatif").glob("*.json"))
-    assert not (bench.archive / "releases").exists()
-
-
 def floors_of(one: Tab) -> dict[str, float]:
     """Smallest detected size of every visible effect on the page of a plan, µg."""
     pairs = one.page.evaluate(
@@ -104,7 +67,7 @@ def floors_of(one: Tab) -> dict[str, float]:
 
 
 @pytest.mark.slow
-def test_a_moved_pose_changes_the_floors_as_the_command_says(bench: Served, browser: Any, pictures: Path) -> None:
+def test_a_moved_pose_changes_the_floors_as_the_command_says(bench: Served, browser: Any) -> None:
     recipe = recipe_file(bench.folder)
     with tab(browser, bench.address) as one:
         one.open("/plan?" + urllib.parse.urlencode({"recipe": recipe}))
@@ -135,7 +98,6 @@ def test_a_moved_pose_changes_the_floors_as_the_command_says(bench: Served, brow
         told = {row["effect"]: row["floor_size_ug"] for row in document["effects"] if row["seen"]}
         assert floors == pytest.approx(told, rel=1e-6)
         assert one.findings() == []
-        one.shot(pictures, "plan")
         assert one.errors == [] == one.outside
 
 
@@ -189,7 +151,7 @@ def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, bro
         )
 
 
-PHONE, SCREEN = (390, 844), (1440, 900)
+PHONE = (390, 844)
 NARROW_PAGES = (
     "/units", "/run", "/unit", "/missing", "/two-models", "/upload", "/operator", "/models", "/plan?only=unseen", "/station",
     "/audit",

@@ -1,6 +1,5 @@
 """Long stories in a real browser: a hidden effect, a lot on a station like hardware, and both by keyboard alone."""
 
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -22,17 +21,7 @@ from stations.safety.folder import read_log
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
-@pytest.fixture
-def pictures(tmp_path: Path) -> Path:
-    """Where the pictures of docs/how-to/workbench.md are made: TUMBLELINE_PICTURES, else the test's own folder."""
-    folder = Path(os.environ.get("TUMBLELINE_PICTURES") or tmp_path / "pictures")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
-def test_the_demonstration_from_its_measurement_to_the_error_falling(
-    tmp_path: Path, browser: Any, pictures: Path
-) -> None:
+def test_the_demonstration_from_its_measurement_to_the_error_falling(tmp_path: Path, browser: Any) -> None:
     folder = tmp_path / "bench"
     command = [sys.executable, "-m", "pipelines.cli", "demo", "cubic_transfer", "--seed", "1", "--by-hand"]
     subprocess.run([*command, "--folder", str(folder)], cwd=ROOT, check=True, capture_output=True, timeout=280)
@@ -49,12 +38,10 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         one.press("text=as the fresh measurement")
         one.sees("[data-version='1']")
         assert one.page.locator("a[data-add=third_order]").first.inner_text() == "Add third_order"
-        one.shot(pictures, "workbench-before", tall=1340)
         one.press("[data-add='third_order']")
         one.sees("[data-version='2']")
         one.ready()
         assert one.page.inner_text(".verdict").startswith("ADEQUATE")
-        one.shot(pictures, "workbench-after", tall=1440)
         fresh = [float(one.page.get_attribute(f"[data-version='{k}']", "data-fresh") or "nan") for k in (1, 2)]
         assert fresh[1] < 0.6 * fresh[0]
         assert "confirmed" in one.page.inner_text("#errors")
@@ -108,7 +95,6 @@ def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_st
                 one.press(".tabs a >> nth=1")
                 until(lambda: "station=simulated" in one.href, "the second station")
                 begun(one, recipe, "B1")
-                one.shot(tmp_path, "two-stations")
             kept = {path: path.read_bytes() for path in tmp_path.glob("archive/captures/*/[0-9]*/record.json")}
             server.end()  # a paused lot does not need the server
             server.begin()
