@@ -21,9 +21,6 @@ from long_suites import mostly_slow
 from printed_pages import ROOT
 
 from benchmarks.generated_archive import write_archive
-from inertial import frames, poses
-from inertial.planning.reasons import reason
-from inertial.state import State
 from pipelines.audit.rules import Rules, load_rules
 from pipelines.audit.sql import VIEWS
 from pipelines.demo.scenes import SCENES
@@ -282,15 +279,6 @@ def test_rules_and_views_of_the_guide_to_audits_are_those_of_the_program(tmp_pat
     assert [key for key in Rules.model_fields if key not in pages.text("pipelines/audit/default.toml")] == []
     table = pages.text(page).partition("| view |")[2].partition("`query` needs the extra")[0]
     assert set(re.findall(r"`(\w+)`", table)) - {"run"} <= set(VIEWS)
-
-
-def test_the_sentence_of_the_guide_to_poses_is_what_is_said() -> None:
-    outer, inner = np.radians(poses.plan("orthogonal24")).T
-    time, warm = 12.0 * np.arange(len(outer)), np.full(len(outer), 25.0)
-    state = State(frames.force_from_angles(outer, inner), time, warm, warm, outer=outer, inner=inner)
-    quoted = re.search(r"\*(β in 90° steps.*?)\*", pages.text("docs/how-to/choose-poses.md"))
-    assert quoted is not None
-    assert reason(state, "cross_coupling", ("bias", "scale", "misalignment")) == quoted[1]
 
 
 def test_every_procedure_with_figures_has_a_sample_recipe_that_the_built_in_station_can_perform() -> None:
