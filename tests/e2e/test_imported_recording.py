@@ -145,6 +145,7 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
     assert sums.loc[("bias_error", "x"), "shown"] < 1.0
     assert sums.loc[("bias_error", "x"), "unseen"] > 100.0
     assert not {("misalignment", axis) for axis in ("yx", "zx", "zy")} & set(sums.index)
+    text_of("show", fitted["run"], "--report", status=0)  # makes it
     (certified,) = document_of("certificate", "issue", fitted["run"])["certified"]
     assert (certified["certificate"], certified["station"], certified["device"]) == ("H1/1", "lab-2", "ADXL355")
     audited = text_of("audit", "--device", "ADXL355")
