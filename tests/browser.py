@@ -109,11 +109,6 @@ def served(archive: Path, folder: Path, *stations: Path) -> Iterator[Served]:
                     os.kill(number, signal.SIGKILL)
 
 
-def clip(width: int, height: int) -> dict[str, float]:
-    """The upper part of a page."""
-    return {"x": 0, "y": 0, "width": width, "height": height}
-
-
 @dataclass
 class Tab:
     """A page of the browser, what it asked for outside, and what went wrong in it."""
@@ -144,22 +139,6 @@ class Tab:
 
     def sees(self, selector: str) -> None:
         until(lambda: self.page.locator(selector).count() > 0, f"{selector} on {self.page.url}")
-
-    def shot(
-        self, folder: Path | None, name: str, *, width: int = 1280, height: int = 720, tall: int | None = None
-    ) -> None:
-        """A picture of the whole page, or of its upper part, where pictures are wanted."""
-        if folder is None:
-            return
-        self.page.set_viewport_size({"width": width, "height": height})
-        whole = min(6000, self.page.evaluate("() => document.documentElement.scrollHeight"))
-        self.page.set_viewport_size({"width": width, "height": max(whole, height)})
-        self.ready()
-        self.page.mouse.move(0, 0)  # a figure that is pointed at has buttons
-        time.sleep(0.4)
-        self.page.add_style_tag(content=".command, .place, #errors code { display: none }")  # they name this machine
-        self.page.screenshot(path=str(folder / f"{name}.png"), clip=None if tall is None else clip(width, tall))
-        self.page.set_viewport_size({"width": 1280, "height": 720})
 
     def click_point(self, figure: str, trace: int, point: int) -> None:
         """Click a point of a figure, as a hand does: move beside it first."""

@@ -5,7 +5,7 @@ import io
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, Union
 
@@ -16,7 +16,6 @@ from docs.documents_page import command_of, documents
 from pipelines.cli import main
 from schemas.errors import DONE, PART_FAILED
 
-Given = Callable[..., tuple[int, str, str]]
 LIKE_RUN = {"fit": "run"}
 """Commands that also print the document of another one."""
 

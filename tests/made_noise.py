@@ -39,8 +39,3 @@ def quantisation(rng: Generator, shape: tuple[int, ...], coefficient: float, rat
     step = coefficient * np.sqrt(12.0)
     error = rng.uniform(-0.5 * step, 0.5 * step, size=(*shape[:-1], shape[-1] + 1))
     return np.diff(error, axis=-1) * rate_hz
-
-
-def rounded(x: Array, step: float) -> Array:
-    """`x` as an amplitude converter with a `step` (unit of the output) gives it."""
-    return np.round(x / step) * step

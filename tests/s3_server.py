@@ -1,6 +1,5 @@
 """A real S3 server process on loopback, for tests; started on a free port and stopped afterwards."""
 
-import os
 import socket
 import subprocess
 import sys
@@ -32,11 +31,6 @@ def s3_bucket(name: str = "factory") -> Iterator[str]:
     finally:
         process.terminate()
         process.wait(10.0)
-
-
-def environment() -> dict[str, str]:
-    """The environment of a process that uses the server."""
-    return {**os.environ, **CREDENTIALS}
 
 
 def _free_port() -> int:

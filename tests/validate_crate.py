@@ -13,22 +13,12 @@ from rocrate_validator import models, services
 from rocrate_validator.utils.http import HttpRequester
 
 CONTEXT = "https://w3id.org/ro/crate/1.1/context"
-SCHEMA = [
-    *("CreateAction", "CreativeWork", "Dataset", "IndividualProduct", "Organization", "Person", "SoftwareApplication"),
-    *(
-        "about",
-        "affiliation",
-        "agent",
-        "author",
-        "contentSize",
-        "datePublished",
-        "description",
-        "encodingFormat",
-        "endTime",
-    ),
-    *("hasPart", "instrument", "license", "mentions", "name", "object", "publisher", "result", "softwareVersion"),
-]
-TERMS = {term: f"http://schema.org/{term}" for term in SCHEMA} | {
+SCHEMA = """
+CreateAction CreativeWork Dataset IndividualProduct Organization Person SoftwareApplication
+about affiliation agent author contentSize datePublished description encodingFormat endTime
+hasPart instrument license mentions name object publisher result softwareVersion
+"""
+TERMS = {term: f"http://schema.org/{term}" for term in SCHEMA.split()} | {
     "File": "http://schema.org/MediaObject",
     "conformsTo": "http://purl.org/dc/terms/conformsTo",
 }

@@ -31,7 +31,6 @@ def one_judgement_of_a_lot() -> Iterator[None]:
 
 @pytest.fixture
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The test's own folder as the working folder."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

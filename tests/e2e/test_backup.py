@@ -48,7 +48,6 @@ def line(made: Path, tmp_path: Path) -> tuple[Archive, Archive]:
 
 
 def content(root: Path) -> dict[str, bytes]:
-    """Every file of an archive but the derived ones."""
     files = {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
     return {name: data for name, data in files.items() if not name.startswith("index/")}
 
@@ -70,7 +69,6 @@ def test_a_further_copy_adds_what_is_new_and_a_continued_run_is_complete_in_it(l
     measure(tmp_path / "line", 2)  # goes on with the run that was interrupted
     again = copy_archive(archive, copy)
     assert 0 < again.files < first.files
-    assert again.present >= first.files - 3  # a seal and a report may be written anew
     assert content(copy.root) == content(archive.root)
     assert verify(copy, keys={}).whole
 

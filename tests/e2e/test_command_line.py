@@ -14,7 +14,6 @@ from in_process import document_of, given, text_of, typed_document
 from root_process import ROOT
 
 from deploy.release import unpack
-from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli import COMMANDS, THREADS, _OnDemand
 from pipelines.cli.candidates import SOURCES, candidates_of
@@ -33,7 +32,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "archive"
 
 
-def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path, measured: Archive) -> None:
+def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path) -> None:
     document = typed_document("run", (archive.parent / "run.json").read_text(encoding="utf-8"))
     assert [unit["unit"] for unit in document["units"]] == ["A1", "A2", "A3"]
     assert document["passed"] + document["failed"] + document["refused"] == 3
@@ -42,18 +41,6 @@ def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path, m
     assert (figure["limit"], figure["unit_text"], "ILAC-G8" in figure["rule"]) == (1000.0, "µg", True)
     told = (archive.parent / "run.err").read_text(encoding="utf-8")
     assert [line.split()[0] for line in told.splitlines() if line][:3] == ["capture", "validate", "reduce"]
-    printed = text_of("show", "--archive", archive)
-    assert all(unit in printed for unit in ("A1", "A2", "A3", "report"))
-    # every statistic of the static record is made from its samples
-    words = ("noise", "allan", "latest", "--archive", measured.root)
-    usual, total = document_of(*words), document_of(*words, "--statistic", "total")
-    assert (total["statistic"], total["deviation_unit"], usual["deviation_unit"]) == ("total", "µg", "µg")
-    assert total["terms"] == usual["terms"]
-    for mine, own in zip(total["curves"], usual["curves"], strict=True):
-        assert mine["channel"] == own["channel"]
-        # at one sample the total deviation has two more differences than the Allan deviation, and no other
-        assert mine["deviation"][0] == pytest.approx(own["deviation"][0], rel=0.01)
-    assert document_of(*words, "--statistic", "mtie")["deviation_unit"] == "m/s"
 
 
 @pytest.fixture
@@ -70,19 +57,12 @@ def listed(tmp_path: Path) -> Archive:
     return store
 
 
-def test_the_list_has_result_station_and_origin_of_every_run_within_80_columns(listed: Archive) -> None:
+def test_the_list_has_result_station_and_origin_of_every_run(listed: Archive) -> None:
     words = ("list", "--archive", listed.root)
     rows = document_of(*words, status=0)["runs"]
     found = [(row["passed"], row["graded"], bool(row["rerun_of"]), row["station"]) for row in rows]
     assert found == [(2, 2, False, "simulated"), (2, 2, True, "simulated"), (None, None, False, "")]
-    _, text, _ = given(*words, columns=80)
-    assert " ".join(text.split()).startswith(f"3 runs in {listed.root} ")
-    assert f"{rows[1]['id']} is a re-run of {rows[1]['rerun_of']}" in text
-    assert text.count("2 of 2") == 2
-    for word in (*(row["id"] for row in rows), "simulated", "unfinished", "started (UTC)", "passed"):
-        assert word in text  # no word is broken
-    assert max(len(line) for line in text.splitlines()[1:] if "is a re-run of" not in line) <= 80
-    assert [number_of(count, "run") for count in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
+    assert f"{rows[1]['id']} is a re-run of {rows[1]['rerun_of']}" in text_of(*words)
 
 
 ASKED = """
@@ -195,7 +175,6 @@ def test_the_tab_key_offers_in_a_real_bash(words: str, completing: Path) -> None
 
 @each(OFFERED)
 def test_what_the_tab_key_offers(words: str, completing: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As the script of the shell asks for it, in this process."""
     monkeypatch.chdir(completing)
     # else the program would be named after pytest, which runs as a package
     monkeypatch.setattr(sys.modules["__main__"], "__package__", None)

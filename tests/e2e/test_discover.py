@@ -55,10 +55,8 @@ def test_a_discovery_is_new_once_and_is_explained(folder: Path, tmp_path: Path) 
     (line,) = printed_commands(text)
     assert line == ["discover", "--archive", str(archive), "--explain", "D1"]
     assert given(*line)[0] == 0
-    explained = document_of("discover", "--explain", "D1", "--archive", archive, status=0)
-    assert explained["levels"][0]["units"] > 10
+    document_of("discover", "--explain", "D1", "--archive", archive, status=0)
     assert "of the sensors" in text_of("discover", "--explain", "d1", "--archive", archive, status=0)
-    assert "smallest effect" in text_of("discover", "--reach", "--archive", archive)
     only = document_of("discover", "--driver", "slot", "--archive", archive)
     assert (only["discoveries"], [one["name"] for one in only["drivers"]]) == ([], ["slot"])
 
@@ -81,9 +79,6 @@ def test_the_archive_is_verified_its_evidence_is_in_order_of_arrival_and_python_
     archive = Archive(str(folder / "archive"))
     (wafer,) = document_of("attributes", "list", "--archive", archive.root)["attributes"]
     assert (wafer["attribute"], wafer["known"], wafer["levels"]) == ("wafer", 352, 4)
-    status, out, err = given("verify", "--archive", archive.root)
-    assert status in {0, 1}, err
-    assert "discovery" not in out
     nights = folder / "archive" / "discovery" / "DEMO" / "nights"
     (entry,) = [json.loads(place.read_bytes()) for place in nights.iterdir()]
     assert entry["runs"] == DiscoveryArchive(archive).pooled()
@@ -108,8 +103,9 @@ def test_refusals_say_what_is_there(words: str, folder: Path) -> None:
 
 
 def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
-    made = Archive(str(tmp_path / "archive"))
-    made.prepare()
+    assert "--lots takes no name" in refused("demo", "pendulous_mass", "--lots", "60")
+    Archive(str(tmp_path / "archive")).prepare()
+    assert "has files already" in refused("demo", "--lots", "400", "--folder", tmp_path)
     assert "no run with dwells, thirty at least" in refused("discover", "--archive", tmp_path / "archive")
     assert "holds no archive" in refused("discover", "--archive", tmp_path / "nothing")
     assert "there is no file" in refused("attributes", "add", tmp_path / "u.csv", "--archive", tmp_path / "archive")
@@ -119,29 +115,10 @@ def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
     assert "--by is 'lot'" in refused(*add, "--by", "lot")
 
 
-def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: Path) -> None:
-    assert "--lots takes no name" in refused("demo", "pendulous_mass", "--lots", "60")
-    made = write_lots(tmp_path, Line(6, units=2), 3)
-    status, out, err = given("discover", "--archive", made.folder)
-    assert status == 0, err
-    assert "3 lots: a discovery needs at least 30" in " ".join(out.split())
-    document = document_of("discover", "--archive", made.folder)
-    assert document["pooled"]["lots"] == 3
-    assert document["reach"] == []
-    assert "has files already" in refused("demo", "--lots", "400", "--folder", folder)
-
-
-@pytest.mark.slow
-def test_scores_on_dask_are_those_of_this_machine(tmp_path: Path) -> None:
-    made = write_lots(tmp_path, Line(8, units=2), 3)
-    assert document_of("discover", "--archive", made.folder, "--dask", "local", "--workers", "1")["pooled"]["lots"] == 3
-
-
 @pytest.mark.slow
 def test_the_demonstration_for_people_ends_with_a_command_that_runs(tmp_path: Path) -> None:
     status, out, err = given("demo", "--lots", "60", "--seed", "4", "--folder", tmp_path / "few")
     assert status == 0, err
-    assert "What was hidden?" in out
     words = out.strip().splitlines()[-1].split()
     assert words[:2] == ["tumbleline", "discover"]
     assert given(*words[1:])[0] in {0, 1}

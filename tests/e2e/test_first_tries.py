@@ -1,7 +1,11 @@
-"""What a person tries first and what is wrong then: one sentence with what was found and what to do, and no file called '-'."""
+"""What a person tries first, and what an installation lacks: one sentence with what was found and what to do."""
 
+import errno
+import fcntl
+import importlib
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -9,6 +13,7 @@ import sys
 import time
 import urllib.request
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,14 +21,15 @@ from each import each
 from in_process import command, given, refused, text_of
 from root_process import ROOT
 from served_station import modbus_station, served, station_file
-from small_station import lot_of
 
 from inertial import effects
-from pipelines.archive import Archive
+from pipelines.archive import Archive, files
+from pipelines.flows import local
+from pipelines.orchestrator import server
 from pipelines.serving.connections import listening_socket
-from schemas.errors import WrongUse
+from schemas.errors import ArchiveUnusable, TumblelineError, WrongUse
+from schemas.installed import not_installed
 from stations.clock import WallClock
-from stations.opening import open_station
 
 WHOLE = '''
 import numpy as np
@@ -48,16 +54,12 @@ class Glue(SensorEffect):
 BROKEN = {
     "class body": ('    symbol = "g"', "    symbol = 1 / 0", r"line 9 in Glue: ZeroDivisionError"),
     "attribute": ("    typical_ug = (1.0, 1000.0)\n", "", "class Glue (line 5): no typical_ug"),
-    "id": ('    id = "glue"\n', "", "class Glue (line 5): no id"),
     "method": ("def names", "def nams", "class Glue (line 5): no method names"),
     "columns": ("state.force[..., axis] ** 2", "state.forces", "class Glue (line 5): line 19 in columns: AttributeError"),
+    "nothing": ("stack(state, [state.force[..., axis] ** 2])", "None", "columns returned NoneType"),
     "shape": (
         "stack(state, [state.force[..., axis] ** 2])", "np.zeros((3, 1))", "columns returned shape (3, 1), shape (3, 22, 1)",
     ),
-    "coefficients": (
-        "stack(state, [state.force[..., axis] ** 2])", "state.force", "columns returned shape",
-    ),
-    "nothing": ("stack(state, [state.force[..., axis] ** 2])", "None", "columns returned NoneType"),
     "not finite": ("axis] ** 2", "axis] * np.nan", "columns returned values that are not finite"),
     "exit": ("import numpy as np", "raise SystemExit(3)", "line 2: SystemExit: 3"),
     "parameter": ('"other poses"', '"other poses"\n    nonlinear = (3,)', "nonlinear holds 3, a Nonlinear is needed"),
@@ -84,7 +86,7 @@ def test_an_error_in_a_users_effect_names_file_class_and_line(what: str, measure
         told = refused(*words, "--effect-file", path)
     assert str(path) in told
     assert message in told
-    assert what not in {"shape", "coefficients"} or "1) is needed (…, dwells, coefficients" in told
+    assert what != "shape" or "1) is needed (…, dwells, coefficients" in told
 
 
 def test_a_shock_without_a_scale_is_refused_with_the_key(tmp_path: Path) -> None:
@@ -94,16 +96,8 @@ def test_a_shock_without_a_scale_is_refused_with_the_key(tmp_path: Path) -> None
     table = np.column_stack([time_s, 0.007 * pulse, pulse])
     np.savetxt(tmp_path / "shock.csv", table, delimiter=",", header=head, comments="")
     (tmp_path / "part.toml").write_text("duration_ms = 11.0\n", encoding="utf-8")
-    words = (
-        "import",
-        tmp_path / "shock.csv",
-        "--procedure",
-        "shock",
-        "--units",
-        "S1",
-        "--archive",
-        tmp_path / "archive",
-    )
+    own = ["--procedure", "shock", "--units", "S1"]
+    words = ("import", tmp_path / "shock.csv", *own, "--archive", tmp_path / "archive")
     for part in ((), ("--set", tmp_path / "part.toml")):
         told = refused(*words, "--map", "z=z [V],reference=reference [g]", *part)
         assert "procedure shock has no scale, output per g is needed" in told
@@ -163,10 +157,6 @@ def test_a_station_that_is_served_faster_is_checked_by_a_client_that_knows_the_s
         unknowing = station_file(tmp_path, modbus_station(port), "unknowing.toml")
         status, _, err = given("station", "check", "--station", unknowing)
         assert (status, "needs the same speed in [link]" in " ".join(err.split())) == (3, True)
-        with open_station(knowing, lot_of()) as station:
-            before, powered = station.clock.now(), station.reader.since_power()
-            station.clock.sleep(30.0)
-            assert station.reader.since_power() - powered == pytest.approx(station.clock.now() - before, abs=15.0)
 
 
 def test_a_port_in_use_is_refused_before_an_address_is_printed() -> None:
@@ -205,3 +195,97 @@ def _opened(address: str):
                 raise
             time.sleep(0.1)
     raise AssertionError(f"{address} does not answer")
+
+
+START = "import sys; sys.modules[{missing!r}] = None; sys.argv[0] = 'tumbleline'; from pipelines.__main__ import main; main()"
+
+
+def raised(path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> ImportError:
+    """What the import of a module with this text raises."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    monkeypatch.syspath_prepend(path.parent)
+    with pytest.raises(ImportError) as caught:
+        importlib.import_module(path.stem)
+    return caught.value
+
+
+@each([("typer", "--help"), ("pandas", "plan production")])
+def test_a_missing_library_is_one_line_with_the_remedy(case: tuple[str, str], tmp_path: Path) -> None:
+    missing, words = case
+    command = [sys.executable, "-c", START.format(missing=missing), *words.split()]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    for part in (f"the library '{missing}' is not installed", f"run: {sys.executable} -m pip install", "run.lock"):
+        assert part in done.stderr
+    assert "defect" not in done.stderr
+
+
+def test_a_library_that_is_missing_or_does_not_load_is_named_with_the_reason_and_no_other_error_is_its_fault(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    problem = raised(tmp_path / "site-packages" / "needy.py", "import absent_one.part", monkeypatch)
+    assert (not_installed(problem) or "").startswith("the library 'absent_one' is not installed: the environment ")
+    outer = RuntimeError("it could not start")
+    outer.__cause__ = problem
+    assert not_installed(outer) == not_installed(problem)
+    text = "raise ImportError('libx.so.1: cannot open shared object file')"
+    problem = raised(tmp_path / "site-packages" / "torn.py", text, monkeypatch)
+    assert (not_installed(problem) or "").startswith("the library 'torn' cannot be loaded (libx.so.1: cannot open")
+    of_a_user = raised(tmp_path / "my_effect.py", "import absent_one", monkeypatch)
+    # a module of this product that is not there is a defect
+    defect = raised(tmp_path / "site-packages" / "old_plugin.py", "import inertial.no_such_module", monkeypatch)
+    for other in (of_a_user, defect, ValueError("x"), ImportError("made, not raised")):
+        assert not_installed(other) is None
+
+
+LAST_LINES = {
+    "ModuleNotFoundError: No module named 'absent.part'": (2, "orchestrator: the library 'absent' is not installed: "),
+    "OSError: something else": (3, "orchestrator: its server ended with status 3; read "),
+}
+
+
+@each(LAST_LINES)
+def test_a_server_that_ends_at_its_start_says_which_library_it_lacks(
+    last: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    earlier = "ModuleNotFoundError: No module named 'of_an_earlier_start'\n"
+    (tmp_path / "server.log").write_text(earlier, encoding="utf-8")
+    ending = tmp_path / "python"
+    ending.write_text(f'#!/bin/sh\necho "{last}" >&2\nexit 3\n', encoding="utf-8")
+    ending.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(ending))
+    with pytest.raises(TumblelineError) as caught:
+        local._start(tmp_path, lambda: None)
+    status, told = LAST_LINES[last]
+    assert caught.value.exit_status == status
+    assert str(caught.value).startswith(told)
+
+
+def test_a_server_that_ends_on_a_full_disk_is_told_by_the_folder_and_its_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, _: bytes) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
+    monkeypatch.setattr(files, "_write_durably", full)
+    with pytest.raises(ArchiveUnusable, match=r"cannot be written \(No space left .*free space is needed"):
+        local._start(tmp_path, lambda: None)
+
+
+def test_a_server_whose_folder_is_gone_or_whose_clients_have_gone_leaves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "LOOK_S", 0.001)
+    served = SimpleNamespace(should_exit=False)
+    server._leave_when_alone(tmp_path / "gone", served)
+    assert served.should_exit
+    (tmp_path / server.CLIENTS).mkdir()
+    (tmp_path / server.ADDRESS).write_text("{}")
+    with (tmp_path / server.CLIENTS / "1").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert not server._left(tmp_path)
+        assert (tmp_path / server.ADDRESS).is_file()
+    assert server._left(tmp_path)
+    assert not (tmp_path / server.ADDRESS).exists()  # it takes its address away

@@ -29,7 +29,6 @@ from stations.links.making import SingleLink
 from stations.links.recorder import FrameRecorder, recorded
 from stations.profile_files import load_profile
 from stations.recordings.clients_view import what_a_client_gets
-from stations.recordings.decoding import said
 from stations.recordings.frame_file import read_frames
 from stations.recordings.other_programs import read_recording
 from stations.recordings.replay_server import ReplayServer
@@ -38,9 +37,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "tests" / "data" / "frames"
 
 
-@pytest.fixture(autouse=True)
-def _own_state(tmp_path, monkeypatch):
-    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+pytestmark = pytest.mark.usefixtures("state")
 
 
 def made(recipe, archive, *more):
@@ -80,21 +77,6 @@ def test_a_replayed_run_gives_the_same_tables_bit_for_bit(recorded_run, tmp_path
     departed = command(["run", other, "--archive", str(tmp_path / "three"), "--direct", "--replay", str(frames)])
     assert departed.returncode == 2
     assert re.search(r"replay: .* continues with", departed.stderr), departed.stderr
-
-
-@pytest.mark.slow
-def test_a_run_with_faults_of_the_wire_is_replayed_with_them(tmp_path):
-    recipe, frames = recipe_file(tmp_path, *QUICK), tmp_path / "run.jsonl"
-    faults = ["--fault", "time_out:at_s=37.5", "--fault", "silent:device=reader:at_s=60:for_s=3"]
-    first, _ = made(recipe, tmp_path / "one", "--record", str(frames), *faults)
-    assert {e.failed for e in read_frames(frames).exchanges} >= {"", "silence"}
-    again, _ = made(recipe, tmp_path / "two", "--replay", str(frames), *faults)
-    for name in sorted({*first.tables()} - {"events"}):
-        assert first.table(name).equals(again.table(name)), name
-    told, then = (
-        [re.sub(r"127\.0\.0\.1:\d+", "", one) for one in run.table("events")["reason"]] for run in (first, again)
-    )
-    assert told == then  # the simulated station is at another port in every process
 
 
 @contextmanager
@@ -140,10 +122,6 @@ def test_a_replayed_device_answers_as_late_and_as_silent_as_the_recorded_one(tmp
     recording = read_frames(recorded_reads(tmp_path, late_s=0.3))
     exchanges = recording.exchanges
     assert [kind_of(e) for e in exchanges] == ["read", "order", "read", "refused"]
-    assert [e.what for e in exchanges[:3]] == ["read temperature", "write set_point", "read temperature"]
-    told = [said(e, recording.device_of(e)) for e in exchanges]
-    assert told[1] == "set_point 60 degC, confirmed"
-    assert told[3] == "exception 2 (no such register, or read-only)"
     new = []
     with ReplayServer(recording, new=new.append) as server, read_by_us(server.port) as (link, profile):
         begun = time.monotonic()
@@ -163,7 +141,6 @@ def test_silences_are_replayed_as_silences_and_a_recording_becomes_a_test(tmp_pa
     path = recorded_reads(tmp_path)
     told = what_a_client_gets(path)
     assert told[-1] == "device: read temperature -> silence"
-    assert told[1] == "device: write set_point -> set_point 60 degC, confirmed"
     whole = path.read_bytes()
     path.write_bytes(whole[:-7])  # a torn last line is left out
     assert "incomplete" in read_frames(path).remark
@@ -309,8 +286,6 @@ def test_a_station_check_is_recorded_with_every_device_and_drawn(tmp_path):
     chart = timeline(recording)
     assert set(chart.plots[0].y.names) >= {"outer", "chamber", "reader"}
     assert recording_module.active_recorder() is None
-    printed = command(["station", "frames", str(path), "--last", "5"])
-    assert "the last 5 of" in printed.stdout
     document = json.loads(command(["station", "frames", str(path), "--json"]).stdout)
     assert len(document["frames"]) == len(recording.exchanges)
 

@@ -8,7 +8,7 @@ import stat
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from datetime import datetime
 from itertools import pairwise
@@ -64,16 +64,9 @@ def tumbleline(*words: object, **environment: str) -> subprocess.CompletedProces
 
 
 def worker_command(line: Orchestrator, *words: str) -> tuple[int, str]:
-    """Status and message of a command to the worker of the station."""
     command = [sys.executable, "-m", "pipelines.orchestrator.worker", words[0], "--station", "line-1", *words[1:]]
     done = subprocess.run(command, cwd=ROOT, env=line.environment, capture_output=True, text=True, check=False)
     return done.returncode, done.stderr
-
-
-def records(folder: Path) -> dict[str, int]:
-    """Finished records of the captures of an archive, with the time at which each was published."""
-    files = (folder / "archive" / "captures").glob("*/*/record.json")
-    return {f"{path.parent.parent.name}/{path.parent.name}": path.stat().st_mtime_ns for path in files}
 
 
 def safe(config: Any) -> bool:
@@ -182,7 +175,7 @@ def test_a_run_whose_computer_died_is_closed_by_the_server_within_a_minute(line:
     with station_served(lot_of(2)) as port:
         config, name = long_run(line, tmp_path, port, "close")
         with worker(line, tmp_path / "a") as process:
-            line.until(lambda: len(records(tmp_path)) >= 1, "a record", 300.0)
+            line.until(lambda: [*tmp_path.glob("archive/captures/*/*/record.json")], "a record", 300.0)
             kill_all(process)
             killed = time.monotonic()
         line.until(lambda: safe(config), "the station is safe", 60.0)
@@ -191,49 +184,6 @@ def test_a_run_whose_computer_died_is_closed_by_the_server_within_a_minute(line:
     assert took <= WITHIN_S, f"closed {took:.0f} s after its computer died"
     assert "no heartbeat for 60 s" in run["state"]["message"]
     assert any(entry["event"] == "watchdog_safe" for entry in read_log(tmp_path / "state"))
-
-
-def started(folder: Path, station: Path, name: str) -> subprocess.Popen[bytes]:
-    """A run on a station by the command, without the orchestrator; its output in files of this name."""
-    command = [sys.executable, "-m", "pipelines.cli", "run", short_recipe_file(folder), "--station", str(station)]
-    command += ["--direct", "--json", "--archive", str(folder / "archive")]
-    environment = {**os.environ, "TUMBLELINE_STATE": str(folder / "state")}
-    with (folder / f"{name}.out").open("w") as out, (folder / f"{name}.err").open("w") as err:
-        return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=out, stderr=err)
-
-
-def wait_for(condition: Callable[[], Any], process: subprocess.Popen[bytes], seconds: float = 120.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert process.poll() in (None, -signal.SIGKILL)
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
-def test_a_run_killed_on_hardware_is_left_safe_by_its_watchdog_and_gone_on_with(tmp_path: Path) -> None:
-    with station_served(lot_of(2)) as port:
-        config = modbus_station(port, limits=FAST)
-        station = station_file(tmp_path, config)
-        first = started(tmp_path, station, "first")
-        wait_for(lambda: len(records(tmp_path)) >= 3, first)
-        assert started(tmp_path, station, "second").wait(120.0) == 3
-        # the lot's own lock; another lot would meet the lease
-        assert "another process" in (tmp_path / "second.err").read_text()
-        first.send_signal(signal.SIGKILL)
-        first.wait()
-        kept = records(tmp_path)
-        logged = tmp_path / "state"
-        wait_for(lambda: any(entry["event"] == "watchdog_safe" for entry in read_log(logged)), first, 30.0)
-        assert safe(config)
-        third = started(tmp_path, station, "third")
-        assert third.wait(240.0) in (0, 1), (tmp_path / "third.err").read_text()
-        assert json.loads((tmp_path / "third.out").read_text())["units"][0]["unit"] == "U000"
-        assert {name: time_ns for name, time_ns in records(tmp_path).items() if name in kept} == kept
-        assert len(records(tmp_path)) == 6 + 2
-        assert read_log(logged)[-1]["event"] == "left_safe"
-    events = sorted(tmp_path.glob("archive/captures/*/events/*.json"))
-    times = [json.loads(path.read_text())["time_s"] for path in events]
-    assert times == sorted(times)  # the run's time went on, though its process was another
 
 
 @pytest.fixture

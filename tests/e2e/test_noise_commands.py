@@ -1,6 +1,5 @@
 """``allan`` and ``psd`` of files and runs, against allantools and against each other."""
 
-import time
 from pathlib import Path
 
 import allantools
@@ -9,11 +8,6 @@ import pandas as pd
 import pytest
 from each import each
 from in_process import document_of, refused, text_of
-from long_suites import mostly_slow
-
-from benchmarks.worlds.noise import fractional
-from inertial.noise.allan import overlapping
-from inertial.noise.terms import fit_terms
 
 RATE = 100.0
 N = 0.002  # g/√Hz, two-sided as in IEEE Std 952
@@ -39,7 +33,6 @@ def within(curve: dict) -> bool:
 
 def test_the_deviations_are_those_of_allantools_and_terms_have_a_value_or_a_limit(record: Path) -> None:
     allan, table = document_of("noise", "allan", record, *OF_G), pd.read_csv(record)
-    assert (allan["samples"], allan["rate_hz"]) == (40_000, pytest.approx(RATE))
     for curve in allan["curves"]:
         values = table[curve["channel"]].to_numpy()
         taus, peer, *_ = allantools.oadev(values, rate=RATE, data_type="freq", taus=curve["tau_s"])
@@ -47,15 +40,11 @@ def test_the_deviations_are_those_of_allantools_and_terms_have_a_value_or_a_limi
         np.testing.assert_allclose(curve["deviation"], peer, rtol=1e-9)
         assert within(curve)
     terms = {(row["channel"], row["term"]): row for row in allan["terms"]}
-    assert len(terms) == 10
     assert terms["ax", "N"]["low"] < N < terms["ax", "N"]["high"]
     assert terms["ax", "N"]["unit"] == "g/√Hz"
     assert terms["ay", "K"]["low"] < 0.004 < terms["ay", "K"]["high"]
     assert terms["ax", "K"]["value"] is None
     assert terms["ax", "K"]["high"] < 0.002
-    printed = text_of("noise", "allan", record, *OF_G)
-    assert "not identified" in printed
-    assert "≤" in printed
 
 
 def test_the_density_gives_the_deviation_and_the_level_of_white_noise_and_is_drawn(
@@ -103,7 +92,6 @@ def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have
     assert set(curve["low"]) == {None} if statistic in WITHOUT_INTERVAL else within(curve)
     name, page = found["statistic_name"], (tmp_path / "a.html").read_text(encoding="utf-8")
     assert f"<h1>{name[0].upper()}{name[1:]}</h1>" in page
-    assert page.count("<svg") == 1
     printed = text_of(*words)
     assert name.split()[0] in printed
     assert ("no interval" in printed) == (statistic in WITHOUT_INTERVAL)
@@ -145,47 +133,3 @@ def test_a_time_is_taken_for_no_output(command: str, record: Path, tmp_path: Pat
     table.assign(t=late).to_csv(tmp_path / "late.csv", index=False)
     message = refused("noise", command, tmp_path / "late.csv", "--rate", 100)
     assert "give --map time=t instead of --rate, or name the channels with --map" in message
-
-
-def test_dates_are_a_time(record: Path, tmp_path: Path) -> None:
-    table = pd.read_csv(record)
-    dates = pd.Timestamp("2026-03-01T00:00:00") + pd.to_timedelta(table["t"], unit="s")
-    table.assign(t=dates.dt.strftime("%Y-%m-%dT%H:%M:%S.%f")).to_csv(tmp_path / "dates.csv", index=False)
-    document = document_of("noise", "allan", tmp_path / "dates.csv", "--unit-of", "output=g")
-    assert document["rate_hz"] == pytest.approx(RATE)
-    assert document["terms"] == document_of("noise", "allan", record, *OF_G)["terms"]
-
-
-@pytest.mark.parametrize(
-    ("given", "unit"),
-    mostly_slow(
-        [(("--rate", "100"), "V"), ((), "V"), (("--unit-of", "output=g"), "g"), (("--map", "time=t,x=T [°C]"), "")],
-        *[((), "V"), (("--map", "time=t,x=T [°C]"), "")],
-    ),
-)
-def test_one_axis_has_the_unit_of_its_heading_and_a_temperature_is_no_output(
-    given: tuple[str, ...], unit: str, record: Path, tmp_path: Path
-) -> None:
-    table = pd.read_csv(record)[["t", "ax"]].rename(columns={"ax": "output [V]"})
-    table["T [°C]"] = 25.0 + np.random.default_rng(4).normal(size=len(table))
-    table.to_csv(tmp_path / "one.csv", index=False)
-    document = document_of("noise", "psd", tmp_path / "one.csv", *given)
-    assert document["unit"] == unit
-    assert {row["channel"] for row in document["spectra"]} == {"output [V]" if unit else "T [°C]"}
-
-
-def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
-    rng = np.random.default_rng(8)
-    x = 1e-3 * fractional(rng, 1, 60_000)[0] + 1e-4 * rng.standard_normal(60_000)
-    pd.DataFrame({"x": x}).to_csv(tmp_path / "flicker.csv", index=False)
-    document = document_of("noise", "allan", tmp_path / "flicker.csv", "--rate", "1")
-    terms = {row["term"]: row for row in document["terms"]}
-    assert 0.7e-3 < terms["B"]["value"] < 1.4e-3
-
-
-@pytest.mark.slow
-def test_a_million_samples_of_three_axes_take_no_more_than_three_seconds_of_computing() -> None:
-    x = np.random.default_rng(0).standard_normal((3, 1_000_000))
-    begin = time.process_time()
-    fit_terms(overlapping(x, RATE))
-    assert time.process_time() - begin < 3.0

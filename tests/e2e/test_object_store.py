@@ -68,7 +68,6 @@ def test_the_commands_work_on_an_address(address: str, local: Run) -> None:
     shown = ask(address, "show", local.id)
     assert {unit["outcome"] for unit in shown["units"]} == {"pass"}
     assert shown["report"].startswith("s3://factory/main/runs/small-")
-    assert ask(address, "show", local.id, "grades")["rows"]
     ask(address, "certificate", "issue", local.id)
     assert ask(address, "show", "A2")["calibration"]["certificate"] == "A2/1"
     ask(address, "certificate", "revoke", "A2", "--reason", "lost")
@@ -80,7 +79,6 @@ def test_the_commands_work_on_an_address(address: str, local: Run) -> None:
     assert len(Archive(address).runs()) == before + 2
     report = ask(address, "verify")
     assert (report["whole"], report["findings"], report["runs"]) == (True, [], before + 2)
-    assert report["rows"] > 0
     assert {step["name"] for step in ask(address, "lineage", local.id)["steps"]} >= {"capture", "fit", "grade"}
 
 
@@ -149,6 +147,4 @@ def test_an_address_that_is_none_is_one_message_and_places_have_the_names_of_pat
     with pytest.raises(ArchiveUnusable, match="address 'nosuch://bucket/x' cannot be used") as problem:
         Archive("nosuch://someone:secret@bucket/x")
     place = ObjectPath(None, "bucket/a/b.json", "s3", "s3://k:secret@bucket/a")
-    assert (place.name, place.stem, place.suffix) == ("b.json", "b", ".json")
-    assert str(place.parent / "c") == "s3://bucket/a/c"
     assert "secret" not in f"{problem.value} {place!r}"

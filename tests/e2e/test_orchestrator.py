@@ -58,7 +58,6 @@ def variable(line: Orchestrator, name: str, **how: str) -> int:
 
 def test_scheduled_runs_appear_the_page_is_served_and_the_files_of_the_server_are_its_own(line: Orchestrator) -> None:
     scheduled = line.until(lambda: line.runs("production-line", "SCHEDULED"), "a scheduled run of the line", 60.0)
-    assert scheduled[0]["auto_scheduled"]
     assert scheduled[0]["expected_start_time"][11:19] == "06:00:00"
     status, page = line.ask("/", key="")
     assert (status, "<html" in page) == (200, True)
@@ -227,7 +226,6 @@ def sent(line: Orchestrator, path: str, size: int, key: str, *, chunked: bool) -
 
 
 def resident_mb(line: Orchestrator) -> float:
-    """Memory of the server."""
     found = 0
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with suppress(FileNotFoundError, ProcessLookupError):  # it has ended

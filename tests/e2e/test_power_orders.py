@@ -17,7 +17,6 @@ from pipelines.chain.runner import Runner
 from pipelines.inquiry.followup import follow_up
 from pipelines.inquiry.inquiry import FOLLOW_UP, FollowUp, begin
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import minutes
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.event import MemoryLog
 from schemas.poses import SoakPart
@@ -33,7 +32,6 @@ COLD = {**QUIET, "bias_stability_ug": 0.0}
 
 
 def recipe_with_power_off(off: tuple[float, ...] = (0.0, OFF_S, 0.0)) -> Recipe:
-    """The same pose three times, the devices off before some."""
     plain = short_recipe(poses=1)
     soak = SoakPart(temperature_C=25.0, poses=[1] * len(off), verification=[], off_s=list(off))
     changed = {"soaks": [soak.model_dump()], "verification": [], "soak_min_s": 60.0, "allow_short_soak": True}
@@ -159,16 +157,6 @@ def test_the_emergency_stop_ends_the_wait_with_power_and_a_reader_that_cannot_sw
         assert station.clock.now() < 1.0
 
 
-def test_the_time_without_power_is_in_the_minutes_of_the_recipe_and_each_pose_needs_one():
-    station = station_of()
-    recipes = recipe_with_power_off(), recipe_with_power_off((0.0, 0.0, 0.0))
-    long, short = (minutes(steps(recipe), station, recipe).total for recipe in recipes)
-    assert long - short == pytest.approx(OFF_S / 60.0, abs=0.02)
-    soak = {"temperature_C": 25.0, "poses": [1, 1], "verification": [], "off_s": [5.0]}
-    with pytest.raises(ValueError, match="soak 1 has 1 times without power for 2 poses"):
-        Recipe.model_validate({**short_recipe(poses=1).model_dump(), "soaks": [soak]})
-
-
 UP, DOWN = (0.0, 0.0), (math.pi, 0.0)
 
 
@@ -194,7 +182,6 @@ def test_warm_up_is_named_by_what_follows_a_power_on_whatever_the_bias_has_come_
     assert finding.state.power_off.max() == pytest.approx(1200.0, abs=2.0)
     assert [t.effect.id for t in finding.diagnosis.base.terms][-1] == "turn_on_bias"
     assert ["warm_up"] in [group["effects"] for group in finding.document["classes"]]
-    assert inquiry.rounds[0]["minutes"] > 20.0
 
     dwells = follower.run.table("dwells")
     up = dwells[(dwells["unit"] == "A1") & (np.abs(dwells["force_z"] - 1.0) < 1e-3)].sort_values("dwell")

@@ -1,4 +1,4 @@
-"""The package for Python, as a scientist uses it: truths from physics, answers and errors as those of the commands."""
+"""The package for Python, as a scientist uses it, and its notebooks: truths from physics, answers as of the commands."""
 
 import inspect
 import json
@@ -6,6 +6,7 @@ import subprocess
 import sys
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from demonstrations import demonstrations_measured_once
 from in_process import document_of
 
 import tumbleline as tl
+from docs import notebooks
 
 ROOT = Path(__file__).resolve().parents[2]
 LIGHT = (
@@ -46,7 +48,7 @@ def lot() -> tl.Example:
 
 
 @pytest.mark.usefixtures("no_next_measurement")
-def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataFrame) -> None:
+def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataFrame, tmp_path: Path) -> None:
     run = tl.read(turned.drop(columns="turn"), units={"output": "g"})
     assert any("ax, ay, az" in line for line in run.told)
     assert len(run.dwells) == 24
@@ -56,6 +58,10 @@ def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataF
     assert np.allclose(tl.read(spans, units={"output": "g"}).dwells[columns], run.dwells[columns], rtol=1e-9)
     untimed = tl.read(turned[["ax", "ay", "az"]], units={"output": "g"}, rate_hz=100.0)
     assert not any("assumed" in line for line in untimed.told)  # what was stated is not assumed
+    for name, part in (("1.csv", turned[:3600]), ("2.csv", turned[3600:])):
+        part.drop(columns="turn").to_csv(tmp_path / name, index=False)
+    parts = [tmp_path / "1.csv", tmp_path / "2.csv"]  # the second one begins with a position
+    assert len(tl.read(parts, units={"output": "g"}).dwells) == 24
     fit = tl.fit(run)
     diagnosis = tl.diagnose(run, fit)
     assert diagnosis.adequate is False
@@ -78,7 +84,6 @@ def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataF
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_next_measurement")
 def test_the_answers_are_those_of_the_commands(lot: tl.Example, tmp_path: Path) -> None:
     lot.run.dwells.to_parquet(tmp_path / "dwells.parquet")
     lot.run.history.to_parquet(tmp_path / "history.parquet")
@@ -93,24 +98,6 @@ def test_the_answers_are_those_of_the_commands(lot: tl.Example, tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_files_of_one_record_are_read_one_after_another(turned: pd.DataFrame, tmp_path: Path) -> None:
-    """A logger that begins a file each minute, with a clock that begins anew; no dwell goes from one file into the next."""
-    samples = turned.drop(columns="turn")
-    parts = [samples.iloc[a:b] for a, b in ((0, 2700), (2700, 5250), (5250, 7200))]
-    paths = [tmp_path / f"{k}.csv" for k in range(len(parts))]
-    for path, part in zip(paths, parts, strict=True):
-        part.assign(t=part["t"] - part["t"].iloc[0]).to_csv(path, index=False)
-    run = tl.read(paths, units={"output": "g"})
-    # the second file ends in the middle of a position: it is a dwell in each of the two files
-    assert len(run.dwells) == 25
-    assert np.all(np.diff(run.dwells["time_s"]) > 0.0)
-    assert len(tl.read([paths[0]], units={"output": "g"}).dwells) == 9
-    with pytest.raises(tl.TumblelineError, match=r"absent\.csv"):
-        tl.read([paths[0], tmp_path / "absent.csv"])
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_next_measurement")
 def test_objects_draw_themselves_and_export_and_an_archive_is_tables(turned: pd.DataFrame, tmp_path: Path) -> None:
     kept = tmp_path / "archive"
     run = tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7", archive=kept)
@@ -140,32 +127,27 @@ def test_objects_draw_themselves_and_export_and_an_archive_is_tables(turned: pd.
 
 @pytest.mark.usefixtures("no_next_measurement")
 def test_what_is_open_is_refused_with_what_to_state(lot: tl.Example, tmp_path: Path) -> None:
-    table = pd.DataFrame(np.random.default_rng(1).normal(size=(50, 2)), columns=["p", "q"])
-    with pytest.raises(tl.WrongUse, match="columns="):
-        tl.read(table)
-    with pytest.raises(tl.TumblelineError, match=r"absent\.csv"):
-        tl.read(tmp_path / "absent.csv")
+    table, dwells = pd.DataFrame(np.random.default_rng(1).normal(size=(50, 2)), columns=["p", "q"]), lot.run.dwells
+    for what, how, message in (
+        (table, {}, "columns="),
+        (tmp_path / "absent.csv", {}, r"absent\.csv"),
+        *(
+            (one, {}, rf"read: found {type(one).__name__}, .* DataFrame")
+            for one in (table["p"], {"p": [1.0]}, None, [])
+        ),
+        (table, {"units": "g"}, r"write units=\{'output': 'g'\}"),
+        (table, {"columns": ["p", "q"]}, r"are needed: columns=\{'x'"),
+        (pd.concat([dwells, dwells[["out_x"]]], axis=1), {}, "column 'out_x' is there twice"),
+        (dwells.iloc[:0], {}, "without rows"),
+        (table, {"history": lot.run.history}, "history: not used for a recording that is imported"),
+        (dwells, {"serial": "SN1", "rate_hz": 100.0}, "serial, rate_hz: not used for a table of dwells"),
+        ("latest", {"serial": "SN1", "units": {"output": "g"}}, "serial, units: not used for a run"),
+    ):
+        with pytest.raises((tl.WrongUse, tl.DataRejected), match=message):
+            tl.read(what, **how)
     with pytest.raises(tl.DataRejected, match="every unit is needed in both"):
         tl.improve(lot.run, [*lot.model, "third_order"], fresh=lot.fresh.dwells.query("unit != 'DEMO-1'"))
-    for wrong in (table.to_numpy(), table["p"], {"p": [1.0]}, None, 5, b"p", []):
-        with pytest.raises(tl.WrongUse, match=rf"read: found {type(wrong).__name__}, .* DataFrame"):
-            tl.read(wrong)
-    with pytest.raises(tl.WrongUse, match=r"write units=\{'output': 'g'\}"):
-        tl.read(table, units="g")
-    with pytest.raises(tl.WrongUse, match=r"are needed: columns=\{'x'"):
-        tl.read(table, columns=["p", "q"])
-    dwells = lot.run.dwells
-    with pytest.raises(tl.DataRejected, match="column 'out_x' is there twice"):
-        tl.read(pd.concat([dwells, dwells[["out_x"]]], axis=1))
-    with pytest.raises(tl.DataRejected, match="without rows"):
-        tl.read(dwells.iloc[:0])
     assert tl.read(dwells.set_index(["unit", "dwell"])).dwells[dwells.columns].equals(tl.read(dwells).dwells)
-    with pytest.raises(tl.WrongUse, match="history: not used for a recording that is imported"):
-        tl.read(table, history=lot.run.history)
-    with pytest.raises(tl.WrongUse, match="serial, rate_hz: not used for a table of dwells"):
-        tl.read(lot.run.dwells, serial="SN1", rate_hz=100.0)
-    with pytest.raises(tl.WrongUse, match="serial, units: not used for a run"):
-        tl.read("latest", serial="SN1", units={"output": "g"})
 
 
 @pytest.mark.usefixtures("no_next_measurement")
@@ -198,7 +180,6 @@ def test_a_name_is_imported_when_it_is_used() -> None:
     seconds, *modules = done.stdout.split()
     assert float(seconds) < 0.3
     assert not {"numpy", "pandas", "prefect", "stations"} & set(modules)
-    assert len(tl.__all__) <= 25
     for name in tl.__all__:
         assert inspect.getdoc(getattr(tl, name)), name
     with pytest.raises(AttributeError, match="it has ArchiveView"):
@@ -229,13 +210,28 @@ print(len(tl.archive("archive").runs))
 @pytest.mark.slow
 def test_the_desk_side_needs_no_module_that_windows_lacks(lot: tl.Example, tmp_path: Path) -> None:
     lot.run.dwells.query("unit == 'DEMO-1'").to_csv(tmp_path / "dwells.csv", index=False)
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT],
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    pipes = {"cwd": tmp_path, "env": {"PYTHONPATH": str(ROOT)}, "capture_output": True, "text": True}
+    done = subprocess.run([sys.executable, "-c", WITHOUT], check=False, **pipes)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "2"
+
+
+FILES = sorted(notebooks.FOLDER.glob("*.ipynb"))
+
+
+def kinds(notebook: dict[str, Any]) -> list[list[str]]:
+    """The forms of output of every cell."""
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    return [[form for one in cell["outputs"] for form in one.get("data", {one["output_type"]: ""})] for cell in cells]
+
+
+@pytest.mark.slow  # what they do with the package: tests/e2e/test_python.py
+@pytest.mark.parametrize("path", FILES, ids=lambda one: one.stem)
+def test_a_notebook_runs_and_shows_what_it_did(path: Path) -> None:
+    assert len(FILES) == 3
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    # it checks itself against its truth
+    assert any("assert" in line for cell in kept["cells"] for line in cell["source"])
+    assert kinds(notebooks.run(path)) == kinds(kept)
+    assert "<svg" in path.read_text(encoding="utf-8")
+    assert str(Path.home()) not in path.read_text(encoding="utf-8")

@@ -21,7 +21,6 @@ from pipelines.stages.reduce import FollowedSupply, at_nominal_supply
 from pipelines.stages.uncertainty.reachable import reachable
 from schemas.decisions import decide
 from schemas.errors import DataRejected, RecipeInvalid
-from schemas.station import load_station
 from schemas.units import AXES
 from stations.opening import make_plant
 from stations.plant.noise import UnitNoise
@@ -104,7 +103,6 @@ def test_the_supply_counts_with_the_level_at_0_g():
     assert supply(terms)["bias", "x"] == pytest.approx(20.0 * 5.0, rel=1e-3)  # 20 ppm of 1.5 V / 0.3 V/g
     assert supply(terms)["scale", "x"] == pytest.approx(20.0, rel=1e-3)
     assert supply(half)["bias", "x"] == pytest.approx(50.0, rel=1e-3)
-    assert load_station().uncertainty == load_station(STATION).uncertainty  # the built-in station states the same
 
 
 MEASURED = 'supply = { u_ppm = 20.0, ratio_measured = true, scope = "station", source = "supply_reading_ppm of the simulation" }'
@@ -199,16 +197,6 @@ def test_a_recording_at_another_supply_is_corrected_to_the_same_force(lot: Simpl
     raw.drop(columns="supply_V").to_csv(tmp_path / "bare.csv", index=False)
     assert "add a column supply_V" in refused("correct", tmp_path / "bare.csv", *correct)
     assert "the coefficients hold at 3 V of supply" in given("export", lot.run.id, *archive, "--format", "json")[2]
-
-
-def test_the_noise_of_a_sample_is_the_density_times_the_root_of_the_filters_bandwidth():
-    for bandwidth, millivolt in ((100.0, 0.84), (25.0, 0.42), (400.0, 1.68)):
-        preset = load_preset("analogue", {"noise_bandwidth_hz": bandwidth})
-        noise = UnitNoise(preset, [np.random.default_rng(k) for k in range(4)]).sample(20_000, 1000.0)
-        assert 1e3 * preset.scale * noise.std() == pytest.approx(millivolt, rel=0.02)
-        flat = noise.reshape(len(noise), -1)
-        follows = np.mean(flat[1:] * flat[:-1]) / np.mean(flat**2)
-        assert follows == pytest.approx(np.exp(-4.0 * bandwidth / 1000.0), abs=0.02)
 
 
 def test_a_plan_counts_the_noise_that_sampling_folds():

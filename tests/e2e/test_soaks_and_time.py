@@ -1,24 +1,33 @@
-"""Soaks with waits of their own, and dwells while the devices still follow the chamber, on the simulated station."""
+"""Soaks with waits, ramps, and dwells while the devices still follow the chamber: time left, plans and tables."""
 
 import dataclasses
 import itertools
+import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+from capture_double import recipe_file
+from in_process import command
 from inquiries import job_of
 from small_station import MemorySink, captured, lot_of, short_recipe, station_of
 
 from inertial.planning.sequences import SequenceStep as Wanted
 from inertial.planning.sequences import timeline
+from pipelines.archive import Archive
 from pipelines.capture.capture import capture
 from pipelines.capture.time_left import Remaining
 from pipelines.inquiry.followup import circumstances, state_after, station_minutes
+from pipelines.jobs.recipes import load_recipe
+from pipelines.planning.requirement import ramp_orders
+from pipelines.planning.timed_design import followed_along, short_of
 from pipelines.schedule.planned_state import planned_state
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import StationPose, minutes
 from schemas.poses import Pose, SoakPart
 from schemas.recipe import Recipe
+from schemas.station import load_station
 from stations.opening import open_station
 
 LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of station time left(?:, about [^,]+ here)?$")
@@ -94,37 +103,30 @@ def test_a_station_that_is_slower_than_its_file_says_teaches_by_its_first_soak_a
     assert max(abs(left - true) / true for left, true in judged) < 0.10
 
 
-def test_a_resumed_run_counts_only_what_is_left_and_far_moves_count_for_more():
-    recipe, far = short_recipe(poses=4), short_recipe(poses=1)
-    first, last = (Remaining(steps(recipe), station_of(), recipe).seconds(steps(recipe)[k], 0.0) for k in (0, -1))
+def test_a_resumed_run_counts_what_is_left_far_moves_for_more_and_the_wall_clock_in_proportion(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    recipe, far, clock = short_recipe(poses=4), short_recipe(poses=1), [100.0]
+    monkeypatch.setattr("pipelines.capture.time_left.time.monotonic", lambda: clock[0])
+    plan = steps(recipe)
+    left = Remaining(plan, station_of(), recipe)
+    first, last = (left.seconds(plan[k], 0.0) for k in (0, -1))
     assert first > 900.0
     assert last < 30.0
     away = far.model_copy(update={"poses": [Pose(name="far", outer_deg=180.0, inner_deg=0.0)]})
     seconds = [Remaining(steps(r), station_of(), r).seconds(steps(r)[0], 0.0) for r in (far, away)]
     assert seconds[1] > seconds[0]
 
-
-def test_the_time_by_the_wall_clock_is_in_proportion_to_the_records_that_are_left(monkeypatch: pytest.MonkeyPatch):
-    clock = [100.0]
-    monkeypatch.setattr("pipelines.capture.time_left.time.monotonic", lambda: clock[0])
-    recipe = short_recipe(poses=4)
-    plan = steps(recipe)
-    left = Remaining(plan, station_of(), recipe)
     assert left.wall_seconds(plan[0]) is None
     clock[0] += 6.0
     for step in plan[:2]:
         left.add_record(step, 12.0)
     done, rest = (sum(left._record[step.record] for step in part) for part in (plan[:2], plan[2:]))
     assert left.wall_seconds(plan[2]) == pytest.approx(6.0 * rest / done)
-    assert left.text(plan[2], 0.0).endswith(" here")
 
 
 def test_parts_of_the_planned_time_are_told_apart_with_the_pace_of_the_file_and_waits_are_as_many_as_poses():
     recipe = short_recipe(2, static_s=120.0)
-    planned = minutes(steps(recipe), station_of(), recipe)
-    assert planned.static_record == pytest.approx(2.0)
-    assert planned.dwells == pytest.approx(3 * 2.0 / 60.0)
-    assert planned.total == pytest.approx(planned.moves + planned.soaks + planned.dwells + planned.static_record)
     first = steps(recipe)[0]
     standing = StationPose(outer=0.0, inner=0.0, air=25.0, device=25.0, soak=first.soak)
     soaked = minutes([first], station_of(), recipe, standing)  # it only moves and dwells
@@ -134,9 +136,10 @@ def test_parts_of_the_planned_time_are_told_apart_with_the_pace_of_the_file_and_
     config = station_of().model_copy(update={"simulation": None})  # hardware takes its pace from the station's file
     fast = config.model_copy(update={"pace": config.pace.model_copy(update={"ramp_K_per_min": 10.0, "lag_s": 60.0})})
     assert minutes(steps(recipe), fast, recipe).soaks < minutes(steps(recipe), config, recipe).soaks
-    soak = {"temperature_C": 25.0, "poses": [1], "verification": [], "waits_s": [1.0, 2.0]}
-    with pytest.raises(ValueError, match="soak 1 has 2 waits for 1 poses"):
-        Recipe.model_validate({**short_recipe(1).model_dump(), "soaks": [soak]})
+    soak = {"temperature_C": 25.0, "poses": [1], "verification": []}
+    for key, said in (("waits_s", "2 waits"), ("off_s", "2 times without power")):
+        with pytest.raises(ValueError, match=f"soak 1 has {said} for 1 poses"):
+            Recipe.model_validate({**short_recipe(1).model_dump(), "soaks": [{**soak, key: [1.0, 2.0]}]})
 
 
 def ordered_recipe():
@@ -204,3 +207,121 @@ def test_follow_ups_and_plans_take_the_same_time_and_the_same_temperatures(tmp_p
         temperatures |= {k: (air, device) for k in (4, 5) if k not in temperatures and now >= ran.time[k]}
     for k in (4, 5):
         assert (ran.air[k], ran.device[k]) == pytest.approx(temperatures[k], abs=0.02)
+
+
+LEVELS = (-10.0, 60.0)
+THERMAL = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
+RAMP = """
+[[soaks]]
+temperature_C = 0.0
+poses = {poses}
+settled = false
+
+[[soaks]]
+temperature_C = 50.0
+poses = {poses}
+settled = false
+"""
+
+
+def test_ramps_go_from_end_to_end_and_a_ramp_that_stays_short_counts_as_worse():
+    assert ramp_orders((-10.0, 25.0, 60.0))[:2] == [(60.0, -10.0), (-10.0, 60.0)]
+    assert ramp_orders((25.0,)) == [(25.0,)]
+    assert short_of(np.array([-9.0, 58.0]), LEVELS) == 0.0
+    assert short_of(np.array([10.0, 58.0]), LEVELS) > 1.0
+    heat = followed_along([60.0] * 200, 30.0, 23.0, load_station())
+    assert np.all(np.diff(heat) >= 0.0)
+    assert heat[-1] == pytest.approx(60.0, abs=1e-3)
+    assert heat[10] < 23.0 + 3.0 * 5.25  # 3 K/min for five and a quarter minutes, and the lag
+
+
+def ramp_recipe(folder: Path, name: str = "ramp") -> str:
+    base = Path(recipe_file(folder, ("temperatures_C = [0.0, 50.0]\n", ""), ('["A1", "A2", "A3"]', '["A1"]')))
+    text = base.read_text(encoding="utf-8").replace('poses = "nine"', 'poses = "twelve"')
+    poses = [*range(1, 13), *range(12, 0, -1)]
+    path = folder / f"{name}.toml"
+    path.write_text(text + RAMP.format(poses=poses), encoding="utf-8")
+    return str(path)
+
+
+def coefficients(archive: Path):
+    run = Archive(archive).run("latest")
+    table = run.table("coefficients")
+    keys = ["unit", "axis", "effect", "name"]
+    return run, table.set_index([key for key in keys if key in table])["value"]
+
+
+DOOR = ("--fault", "door:at_s=200:for_s=60")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("faults", [DOOR, (), ("--fault", "time_out:at_s=250")])
+def test_a_station_measures_on_ramps_undisturbed_through_a_lost_answer_and_an_open_door(faults, tmp_path):
+    recipe = ramp_recipe(tmp_path)
+    done = command(["run", recipe, "--archive", str(tmp_path / "archive"), "--direct", "--json", *faults])
+    assert done.returncode in {0, 1}, done.stderr
+    document = json.loads(done.stdout)
+    assert all(unit["outcome"] != "refused" for unit in document["units"])
+    run, _ = coefficients(tmp_path / "archive")
+    dwells = run.table("dwells")
+    own = dwells[dwells["unit"] == dwells["unit"].iloc[0]]
+    assert own["unit_C"].nunique() > 40  # every dwell at a temperature of its own
+    if any("door" in fault for fault in faults):
+        assert "suspended" in set(run.table("events")["kind"]) or "spoilt" in set(run.table("events")["kind"])
+
+
+@pytest.mark.slow
+def test_a_run_on_ramps_that_was_stopped_goes_on_to_the_same_tables(tmp_path, monkeypatch):
+    from pipelines.capture import capture as capturing
+    from schemas.errors import OperatorNeeded
+
+    recipe = ramp_recipe(tmp_path)
+    whole = command(["run", recipe, "--archive", str(tmp_path / "whole"), "--direct"])
+    assert whole.returncode in {0, 1}, whole.stderr
+    taken, measure = [], capturing.CaptureRun.measure_and_store
+
+    def stops(self, step):
+        if len(taken) == 30:
+            raise OperatorNeeded("a stop in the middle of a ramp")
+        taken.append(step)
+        measure(self, step)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(capturing.CaptureRun, "measure_and_store", stops)
+        stopped = command(["run", recipe, "--archive", str(tmp_path / "stopped"), "--direct"])
+        assert stopped.returncode == 3
+    again = command(["run", recipe, "--archive", str(tmp_path / "stopped"), "--direct"])
+    assert again.returncode in {0, 1}, again.stderr
+    first, second = coefficients(tmp_path / "whole")[1], coefficients(tmp_path / "stopped")[1]
+    assert first.equals(second)
+
+
+@pytest.mark.slow
+def test_the_command_writes_a_recipe_on_ramps_with_its_bound(tmp_path):
+    target = tmp_path / "quick.toml"
+    page = tmp_path / "quick.html"
+    words = ["plan", "optimise", "--effects", ",".join(THERMAL), "--device", "analogue", "-o", str(target)]
+    for setting in ("ramp=yes", "factor=3", "verification=1"):
+        words += ["--set", setting]
+    done = command([*words, "--output", str(page), "--json"])
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document["ramp"] is True
+    assert 0.0 < document["bound"]["share"] <= document["share"] < 0.35
+    recipe = load_recipe(str(target))
+    assert {soak.settled for soak in recipe.soaks} == {False}
+    # errors three times as large must not shorten the range over which the model holds
+    heat = planned_state(recipe, load_station()).temperature
+    assert short_of(heat, LEVELS) == 0.0
+
+
+@pytest.mark.slow
+def test_the_quick_recipe_takes_two_thirds_of_the_main_jobs_time_and_its_model_is_adequate(tmp_path):
+    minutes = {
+        name: json.loads(command(["plan", name, "--json"]).stdout)["minutes"]["total"]
+        for name in ("quick", "production")
+    }
+    assert minutes["quick"] < 0.65 * minutes["production"]
+    done = command(["run", "quick", "--archive", str(tmp_path / "archive"), "--direct", "--json"])
+    verdict = json.loads(done.stdout)["adequacy"]
+    assert (verdict["adequate"], verdict["named"]) == (True, False)

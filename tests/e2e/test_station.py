@@ -1,14 +1,10 @@
 """The station end to end: recipe, adapters, Modbus TCP, plant; limits, full fixtures, other devices, another maker's client."""
 
 import os
-import shutil
 import socket
 import subprocess
 import sys
 import tempfile
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +21,14 @@ from inertial.frames import force_from_angles
 from pipelines.capture.capture import capture
 from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid, StationRefused
-from schemas.fault import parse_fault
 from schemas.poses import Pose, SoakPart
 from schemas.recipe import Recipe
-from schemas.station import StationConfig, load_station, with_faults
+from schemas.station import StationConfig, load_station
 from schemas.table_check import check as check_table
 from stations import serving
-from stations.links.lines import LineLink, TcpLines
 from stations.opening import make_plant, one_processor, open_station, serve_plant, tighter
 from stations.profile_files import load_profile
-from stations.serving import look, serve
+from stations.serving import look
 
 STATIONS = ROOT / "deploy" / "stations"
 OTHERS = ["simulated-smc-binder", "simulated-iai-espec"]
@@ -129,14 +123,6 @@ def test_a_killed_run_on_other_devices_goes_on_bit_for_bit_and_every_value_can_b
     assert float(chamber["temperature"]) == pytest.approx(23.0, abs=0.2)
 
 
-@each(["sf1500", "qa700", "analogue"])
-def test_analogue_devices_are_read_in_volts(device: str) -> None:
-    sink = captured(short_recipe(poses=1), lot_of(2, device))
-    readings = sink.all(1)
-    assert (readings["out_unit"] == "V").all()
-    assert (sink.all(0)[["x", "y", "z"]].abs().max() < readings["full_scale"].max() + 1.5).all()
-
-
 def test_the_temperature_of_a_dwell_on_a_ramp_is_that_of_its_middle() -> None:
     parts = [
         SoakPart(temperature_C=25.0, poses=[1], verification=[]),
@@ -157,12 +143,10 @@ def test_the_temperature_of_a_dwell_on_a_ramp_is_that_of_its_middle() -> None:
     assert np.max(np.abs(readings["unit_C"].to_numpy() - true)) < 0.02
 
 
-def on_a_fixture(slots: int, units: int, *faults: str) -> MemorySink:
+def on_a_fixture(slots: int, units: int) -> MemorySink:
     """A lot on one fixture: all slots start together, share table and chamber."""
     config = load_station(STATIONS / f"simulated-{slots}.toml")
-    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 1.0, "read_attempts": 1})})
-    recipe = short_recipe(poses=2, temperatures=(25.0, 40.0))
-    return captured(recipe, lot_of(units), with_faults(config, [parse_fault(text) for text in faults]))
+    return captured(short_recipe(poses=2, temperatures=(25.0, 40.0)), lot_of(units), config)
 
 
 def station_seconds(readings: pd.DataFrame) -> float:
@@ -178,21 +162,6 @@ def test_a_full_fixture_takes_hardly_longer_than_one_unit() -> None:
         assert readings.groupby("record")["unit"].nunique().unique().tolist() == [units]
         assert readings.groupby("record")["start_s"].nunique().max() == 1, "all slots start together"
         assert station_seconds(readings) <= 1.05 * alone
-
-
-@pytest.mark.slow
-def test_units_that_fail_never_hold_up_the_others() -> None:
-    faults = (
-        "silent:serial=U003:at_s=900", "dead:serial=U007", "garbage:serial=U011:at_s=1200",
-        "frozen_temperature:serial=U005:at_s=950", "mute:serial=U015:at_s=990",
-    )  # fmt: skip
-    sink = on_a_fixture(16, 16, *faults)
-    readings = sink.all(1)
-    last = readings[readings["record"] == readings["record"].max()]
-    lost = last.loc[last["status"] != "ok", "unit"].tolist()
-    assert lost == ["U003", "U005", "U011", "U015"]
-    assert len(sink.records) == 6
-    assert (last.loc[~last["unit"].isin(lost), "n"] == 200).all()
 
 
 def limited(**limits: object) -> StationConfig:
@@ -279,65 +248,14 @@ def test_the_safe_state_is_the_one_of_the_file() -> None:
         assert "outer axis stopped not done" in reached.sentence()
 
 
-def test_a_served_station_speaks_in_lines_one_port_behind_its_registers() -> None:
-    config, ready, stop, where = load_station(STATIONS / f"{OTHERS[1]}.toml"), threading.Event(), threading.Event(), []
-
-    def listening(host: str, port: int) -> None:
-        where.extend((host, port))
-        ready.set()
-
-    options = {"host": "127.0.0.1", "port": 0, "speed": 1.0, "stop": stop, "ready": listening}
-    thread = threading.Thread(target=serve, args=(config, lot_of(1)), kwargs=options, daemon=True)
-    thread.start()
-    try:
-        assert ready.wait(20.0)
-        link = LineLink(TcpLines(where[0], where[1] + 1, 5.0), read_attempts=1)
-        assert link.tell("TEMP, S40.0", "set point") == "OK:TEMP, S40.0"
-        air, target, high, low = (float(part) for part in link.ask("TEMP?", "air").split(","))
-        assert (target, high, low) == (40.0, 180.0, -70.0)
-        assert air == pytest.approx(23.0, abs=0.5)
-        link.close()
-    finally:
-        stop.set()
-        thread.join(10.0)
-    assert not thread.is_alive()
-
-
-@contextmanager
-def served_by_command(*options: str) -> Iterator[int]:
-    """``tumbleline station serve`` as a process of its own; gives its port."""
+@pytest.mark.slow
+def test_the_command_serves_a_station_at_the_port_that_it_tells() -> None:
     words = [sys.executable, "-m", "pipelines.cli", "station", "serve", "--port", "0", "--slots", "2", "--json"]
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    pipes = {"stdout": subprocess.PIPE, "text": True, "env": buffered}
-    with subprocess.Popen([*words, *options], cwd=ROOT, **pipes) as process:
-        try:
-            text = "".join(iter(process.stdout.readline, "}\n")) + "}\n"
-            yield int(typed_document("station", text)["port"])
-        finally:
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=buffered) as process:
+        document = typed_document("station", "".join(iter(process.stdout.readline, "}\n")) + "}\n")
+        with socket.create_connection(("127.0.0.1", document["port"]), 5.0):
             process.terminate()
-            process.wait(20.0)
-
-
-def mbpoll(port: int, device_id: int, address: int, kind: str, *more: str) -> list[str]:
-    """What Debian's mbpoll reads at an address."""
-    program = shutil.which("mbpoll")
-    if program is None:
-        pytest.skip("mbpoll is not installed; 'make debian' as root installs it")
-    options = f"-m tcp -p {port} -a {device_id} -0 -r {address} -t {kind} -1".split()
-    command = [program, *options, *more, "127.0.0.1"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)
-    return [line.split("\t")[-1].strip() for line in done.stdout.splitlines() if line.startswith("[")]
-
-
-@pytest.mark.slow
-def test_a_client_of_another_maker_reads_what_the_profiles_say() -> None:
-    with served_by_command("--speed", "20") as port:
-        assert [int(word, 16) for word in mbpoll(port, 11, 0, "4:hex", "-c", "4")] == [0x5349, 0x4D30, 0x3030, 0x3000]
-        assert float(mbpoll(port, 3, 2820, "4:float")[0]) == pytest.approx(23.0, abs=0.5)  # low word first
-        assert float(mbpoll(port, 10, 2, "4:float", "-B")[0]) == 100.0  # high word first
-        early = float(mbpoll(port, 10, 4, "4:float", "-B")[0])
-        assert float(mbpoll(port, 10, 4, "4:float", "-B")[0]) >= early > 0.0
-        assert mbpoll(port, 10, 0, "4")[0] == "8"
 
 
 @pytest.fixture
@@ -350,34 +268,16 @@ def claims(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     not hasattr(os, "sched_setaffinity") or len(os.sched_getaffinity(0)) < 2, reason="needs two processors"
 )
 @pytest.mark.usefixtures("claims")
-def test_stations_have_different_processors_with_their_threads_and_one_too_many_has_all(
+def test_stations_have_different_processors_and_give_them_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     every = os.sched_getaffinity(0)
-    taken: list[set[int]] = []
-    inside, leave = threading.Semaphore(0), threading.Event()
-
-    def started() -> None:
-        taken.append(os.sched_getaffinity(0))
-        inside.release()
-        leave.wait(30.0)
-
-    def station() -> None:
+    with one_processor():
+        (own,) = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, every)  # as the thread of another station begins
         with one_processor():
-            thread = threading.Thread(target=started)
-            thread.start()
-            thread.join()
-        assert os.sched_getaffinity(0) == every
-
-    threads = [threading.Thread(target=station) for _ in range(len(every) + 1)]
-    for thread in threads:
-        thread.start()
-        assert inside.acquire(timeout=30.0)
-    leave.set()
-    for thread in threads:
-        thread.join()
-    assert [len(own) for own in taken] == [1] * len(every) + [len(every)]
-    assert set.union(*taken[:-1]) == every
+            assert os.sched_getaffinity(0).isdisjoint({own})
+    assert os.sched_getaffinity(0) == every
     monkeypatch.setattr(tempfile, "tempdir", "/proc/none")
     with one_processor():
         assert os.sched_getaffinity(0) == every  # without a place for its claim nothing changes

@@ -1,18 +1,31 @@
-"""Devices on serial lines and behind TLS, driven by the production adapters through a station's file."""
+"""Devices on serial lines, behind TLS and by SCPI, driven by the production adapters: wires, levels, refusals, safe states."""
 
+from collections.abc import Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from each import each
 from other_devices import station_with
 from plant_wires import Authority, SerialPlantServer, TlsPlantServer, serial_line
+from root_process import ROOT
 from small_station import lot_of, plant_of
 
-from schemas.errors import LinkLost, RecipeInvalid, StationRefused, StationTimeout
-from schemas.station import StationConfig
+from inertial.dynamics.sine_fit import fit_tone
+from schemas.errors import LinkLost, OperatorNeeded, RecipeInvalid, StationRefused, StationTimeout
+from schemas.fault import FaultOrder
+from schemas.station import StationConfig, load_station, with_faults
+from schemas.station_devices import Device, Equipment
+from stations import open_station
+from stations.clock import Clock
+from stations.devices.commands import Values
+from stations.devices.equipment import RecordingSpoilt
+from stations.devices.families.scpi_supply import ScpiSupply
 from stations.links import serial_wire
 from stations.opening import open_devices
 from stations.profile_files import load_profile, profile_names
+from stations.station import Station
 
 CHAMBERS = [n for n in profile_names() if load_profile(n).kind == "chamber" and "rtu" in load_profile(n).links]
 PATIENCE_S = 10.0
@@ -31,7 +44,6 @@ def hardware(config: StationConfig, patience: dict[str, object] | None = None, *
 
 @contextmanager
 def on_a_serial_line(slots=(), devices=None, **patience):
-    """A plant, its serial line, and a station on it."""
     config = station_with(**(devices or {}))
     plant = plant_of(config, lot_of(1))
     with serial_line() as line, SerialPlantServer(plant, line.device):
@@ -41,7 +53,6 @@ def on_a_serial_line(slots=(), devices=None, **patience):
 
 
 ONCE = {"read_attempts": 1, "timeout_s": PATIENCE_S}
-"""A station that asks once and has much patience."""
 
 
 def wire_of(station):
@@ -190,7 +201,7 @@ def test_who_is_not_who_he_says_is_not_believed_by_either_side(secured, tmp_path
         pass
 
 
-def test_lines_settings_and_carriers_that_cannot_be_are_told_by_name(tmp_path):
+def test_lines_settings_and_carriers_that_cannot_be_are_told_by_name():
     nowhere = hardware(station_with(), link="rtu", serial="/dev/none", baud=19200)
     with open_devices(nowhere, ()) as station, pytest.raises(LinkLost, match="/dev/none"):
         station.chamber.temperature()
@@ -200,7 +211,105 @@ def test_lines_settings_and_carriers_that_cannot_be_are_told_by_name(tmp_path):
         real = hardware(station_with(), once, link="rtu", serial=line.host, baud=19200, parity="even")
         with open_devices(real, ()) as station, pytest.raises((LinkLost, StationTimeout), match=line.host):
             station.chamber.temperature()
-    where = {"link": "tls", "host": "127.0.0.1", "port": 1, "ca_file": str(Authority(tmp_path).file)}
-    real = hardware(station_with(chamber="espec_p300"), **where)
-    with pytest.raises(RecipeInvalid, match="is carried by ascii"), open_devices(real, ()):
-        pass
+
+
+FAMILIES = ROOT / "stations" / "devices" / "families"
+
+
+EXCITER = {"exciter": Device(profile="scpi_exciter", device_id=241, link="ascii")}
+SHOCK_MACHINE = {"shock_machine": Device(profile="modbus_shock", device_id=60, link="tcp")}
+
+
+@contextmanager
+def opened(equipment: dict[str, Device], *faults: str, units: int = 1) -> Iterator[Station]:
+    config = load_station().model_copy(update={"equipment": Equipment(**equipment)})
+    orders = [FaultOrder(kind=kind) for kind in faults]
+    with open_station(with_faults(config, orders), lot_of(units), roles=[*equipment]) as station:
+        yield station
+
+
+@each([(20.0, 0.3), (160.0, 2.0), (900.0, 5.0)])
+def test_the_level_of_an_open_loop_generator_is_reached(case: tuple[float, float]) -> None:
+    frequency, level = case
+    with opened(EXCITER) as station:
+        recording = station.equipment["exciter"].sine(frequency, level, 2, 0.2, [0])
+        tone = fit_tone(recording.reference, recording.reference_rate_hz, frequency)
+        assert abs(tone.value[2]) == pytest.approx(level, rel=0.12)
+        assert recording.outputs[0].shape[1] == 3
+
+
+def test_the_supply_sets_measures_and_returns_to_its_nominal_voltage() -> None:
+    with open_station(load_station(), lot_of(1), roles=["power_supply"]) as station:
+        supply = station.equipment["power_supply"]
+        nominal = station.reader.instruments().supply_V[0]
+        ratio = supply.set_voltage(0.9 * 3.3)
+        assert station.reader.instruments().supply_V[0] / nominal == pytest.approx(ratio, rel=1e-3)
+        supply.stand_by()
+        assert station.reader.instruments().supply_V[0] == pytest.approx(nominal, rel=1e-3)
+        for volt in (60.0, 12.0, float("nan")):  # in the range of the supply or not: devices for 3.3 V do not endure it
+            with pytest.raises(StationRefused, match=r"at most 50 % from the nominal 3\.3 V"):
+                supply.set_voltage(volt)
+        assert station.reader.instruments().supply_V[0] == pytest.approx(nominal, rel=1e-3)
+        supply.set_voltage(3.0)
+        assert "power supply stopped" in station.make_safe().done
+        assert station.reader.instruments().supply_V[0] == pytest.approx(nominal, rel=1e-3)
+
+
+class Queue:
+    """A supply whose queue has errors that somebody else has caused."""
+
+    name = "power supply"
+
+    def __init__(self, codes: list[int]) -> None:
+        self.codes, self.set, self.profile = codes, 3.3, SimpleNamespace(stated={})
+
+    def number(self, name: str) -> float:
+        if name == "error":
+            return float(self.codes.pop(0)) if self.codes else 0.0
+        return self.set
+
+    def has(self, name: str) -> bool:
+        return name != "ripple"
+
+    def write(self, name: str, value: object) -> None:
+        if name == "voltage":
+            self.set = float(str(value))
+
+
+def supply_with(codes: list[int]) -> tuple[Queue, ScpiSupply]:
+    queue = Queue(codes)
+    return queue, ScpiSupply(cast("Values", queue), cast("Clock", SimpleNamespace(sleep=lambda seconds: None)))
+
+
+def test_errors_of_earlier_users_of_a_supply_are_not_those_of_our_orders_unless_they_never_end() -> None:
+    queue, supply = supply_with([-113, -222, -410])
+    assert supply.set_voltage(3.0) == pytest.approx(3.0 / 3.3)
+    queue.codes.append(-222)
+    with pytest.raises(StationRefused, match=r"error -222 at 2\.8 V"):
+        supply.set_voltage(2.8)
+    _, endless = supply_with([-350] * 1000)
+    with pytest.raises(StationRefused, match="queue is not empty, an end is needed"):
+        endless.set_voltage(3.0)
+
+
+TROUBLE = {
+    "guard_door": (OperatorNeeded, "guard door is open"),
+    "missed_trigger": (RecordingSpoilt, "trigger was missed"),
+    "level_not_reached": (RecordingSpoilt, "was ordered"),
+}
+
+
+def test_a_shock_machine_by_modbus_is_armed_released_and_read_and_gives_no_recording_in_trouble() -> None:
+    with opened(SHOCK_MACHINE, units=2) as station:
+        recording = station.equipment["shock_machine"].shock(30.0, 0.011, 2, -1, [0, 1])
+        assert float(recording.reference[:, 2].min()) == pytest.approx(-30.0, rel=0.15)
+        assert set(recording.outputs) == {0, 1}
+        assert "shock machine stopped" in station.make_safe().done
+    for kind, (error, text) in TROUBLE.items():
+        with opened(SHOCK_MACHINE, kind) as station, pytest.raises(error, match=text):
+            station.equipment["shock_machine"].shock(30.0, 0.011, 2, 1, [0])
+
+
+def test_production_adapters_of_equipment_know_no_plant() -> None:
+    for path in FAMILIES.glob("*.py"):
+        assert "plant" not in path.read_text(encoding="utf-8"), path.name

@@ -1,19 +1,17 @@
-"""The workbench in a real browser: pages that are drawn, a hidden effect found, names that stay names, a server that dies."""
+"""The workbench in a real browser: pages that are drawn, on narrow screens, of unusual archives, and of a server that dies."""
 
-import os
 import signal
 import urllib.parse
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import pytest
 from browser import Served, Tab, served, tab, until
 from capture_double import recipe_file, small_run
-from in_process import document_of, text_of
+from in_process import document_of
 from long_suites import mostly_slow
-
-from pipelines.jobs.recipes import load_recipe
+from unusual_archives import SCRIPT, addresses, unusual_archive
 
 FEW = ("/unit?run=latest", "/station")
 PAGES = (*FEW, "/units", "/run?run=latest", "/upload", "/missing", "/operator", "/models", "/plan", "/audit")
@@ -31,14 +29,6 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     folder.mkdir()
     with served(top / "archive", folder) as one:
         yield one
-
-
-@pytest.fixture(scope="module")
-def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where pictures are kept: TUMBLELINE_PICTURES, else the folder of the run."""
-    folder = Path(os.environ.get("TUMBLELINE_PICTURES") or tmp_path_factory.mktemp("pictures"))
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 @pytest.mark.parametrize(
@@ -68,33 +58,6 @@ def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybod
         until(lambda: "has read access only" in one.page.inner_text("main"), "the page says why nothing begins")
 
 
-@pytest.mark.slow  # what may be released: tests/unit/pipelines/rerun/test_whatif.py
-def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
-    bench: Served, browser: Any, pictures: Path
-) -> None:
-    place = bench.folder / "models" / "cubic.toml"
-    place.parent.mkdir(exist_ok=True)
-    text_of("extend", place, "third_order", "--reason", "a trial", status=0)
-    with tab(browser, bench.address) as one:
-        one.open("/models?model=cubic")
-        assert "+ third_order" in one.page.inner_text("[aria-label=Versions]")
-        one.page.fill("input[name=reason]", "no evidence yet")
-        one.press("form[data-post='/models/release'] button")
-        until(lambda: "a what-if is needed" in one.page.inner_text("main"), "a release without evidence is refused")
-        one.press("[data-evaluate]")
-        one.sees("[data-whatif=new]")
-        verdict = one.page.inner_text(".verdict")
-        assert "No better" in verdict  # 3 calibrations, nothing hidden in them
-        one.shot(pictures, "models")
-        one.page.fill("input[name=reason]", "it is no better")
-        one.press("form[data-post='/models/release'] button")
-        until(lambda: "a better model is needed" in one.page.inner_text("main"), "a worse model is refused")
-        assert one.findings() == []
-        assert one.outside == []
-    assert list((bench.archive / "whatif").glob("*.json"))
-    assert not (bench.archive / "releases").exists()
-
-
 def floors_of(one: Tab) -> dict[str, float]:
     """Smallest detected size of every visible effect on the page of a plan, µg."""
     pairs = one.page.evaluate(
@@ -104,9 +67,7 @@ def floors_of(one: Tab) -> dict[str, float]:
 
 
 @pytest.mark.slow
-def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_written(
-    bench: Served, browser: Any, pictures: Path
-) -> None:
+def test_a_moved_pose_changes_the_floors_as_the_command_says(bench: Served, browser: Any) -> None:
     recipe = recipe_file(bench.folder)
     with tab(browser, bench.address) as one:
         one.open("/plan?" + urllib.parse.urlencode({"recipe": recipe}))
@@ -136,25 +97,7 @@ def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_w
         document = document_of("plan", recipe, "--pose", moved[0], "--archive", bench.archive)
         told = {row["effect"]: row["floor_size_ug"] for row in document["effects"] if row["seen"]}
         assert floors == pytest.approx(told, rel=1e-6)
-        one.page.select_option("select[name=name]", "p2")
-        one.page.fill("input[name=outer]", "75.5")
-        one.page.fill("input[name=inner]", "-20")
-        one.press("text=Move the pose")
-        until(lambda: "p2" in urllib.parse.unquote(one.href), "the second move is in the address")
-        one.sees("tr[data-effect]")
-        one.ready()
         assert one.findings() == []
-        one.shot(pictures, "plan")
-        one.page.fill("input[name=name]", "moved")
-        one.press("text=Write >> nth=-1")
-        one.sees("text=is written")
-        written = {
-            pose.name: (pose.outer_deg, pose.inner_deg) for pose in load_recipe(str(bench.folder / "moved.toml")).poses
-        }
-        assert written["p2"] == (75.5, -20.0)
-        assert {f"{name}={o:g},{i:g}" for name, (o, i) in written.items()} >= {*moved, "p2=75.5,-20"}
-        one.press("[data-back] >> nth=0")
-        until(lambda: one.page.locator("[data-back]").count() == 1, "the first move is taken back")
         assert one.errors == [] == one.outside
 
 
@@ -181,6 +124,12 @@ def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, bro
         one.page.reload()
         one.ready()
         one.sees("[data-name='samples'][data-drawn]")
+        one.page.locator("[data-name=residuals]").focus()  # a dot is reached and chosen by keyboard, too
+        one.page.keyboard.press("ArrowRight")
+        until(lambda: one.page.locator("[data-name=residuals] .hovertext").count() > 0, "the dot says what it is")
+        before = one.href
+        one.page.keyboard.press("Enter")
+        until(lambda: one.href != before, "the dwell of the dot is in the address")
         assert one.errors == []
 
 
@@ -200,3 +149,139 @@ def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, bro
             lambda: rows.count() >= 1 and all("a2" in row.lower() for row in rows.all_inner_texts()),
             "the search answers",
         )
+
+
+PHONE = (390, 844)
+NARROW_PAGES = (
+    "/units", "/run", "/unit", "/missing", "/two-models", "/upload", "/operator", "/models", "/plan?only=unseen", "/station",
+    "/audit",
+)  # fmt: skip
+OUTSIDE = """() => [...document.querySelectorAll("main *, header *")]
+    .filter((e) => e.checkVisibility() && !e.closest(".scroll, svg, .hidden, .skip"))
+    .filter((e) => e.getBoundingClientRect().right > innerWidth + 1)
+    .map((e) => `${e.tagName} ${e.className} ${e.textContent.trim().slice(0, 40)}`)"""
+
+
+@pytest.fixture(scope="module")
+def narrow(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    top = tmp_path_factory.mktemp("screens")
+    small_run(top, {"A2": "dead"})
+    (top / "narrow").mkdir()
+    recipe_file(top / "narrow")
+    with served(top / "archive", top / "narrow") as one:
+        yield one
+
+
+@pytest.mark.slow
+def test_on_a_narrow_screen_nothing_is_cut_and_the_whole_menu_is_seen(narrow: Served, browser: Any) -> None:
+    with tab(browser, narrow.address, size=PHONE) as one:
+        for path in NARROW_PAGES:
+            one.open(path)
+            assert one.page.evaluate(OUTSIDE) == [], path
+            assert one.page.evaluate("() => document.documentElement.scrollWidth") <= PHONE[0], path
+            links = one.page.locator(".bar nav a")
+            assert links.count() >= 9
+            assert all(link.bounding_box()["x"] + link.bounding_box()["width"] <= PHONE[0] for link in links.all())
+        assert one.errors == []
+
+
+@pytest.mark.slow
+def test_a_serial_is_checked_at_its_scan_and_a_bell_calls_the_operator_of_a_lot_that_is_drawn(
+    narrow: Served, browser: Any
+) -> None:
+    with tab(browser, narrow.address) as one:
+        one.open("/operator")
+        one.press("[data-bell]")
+        assert one.page.evaluate("() => document.body.dataset.rung") == "1"  # so that one hears how it sounds
+        for slot, serial in ((0, "S1"), (1, "S1")):
+            one.page.fill(f"#slot-{slot}", serial)
+            one.page.press(f"#slot-{slot}", "Enter")
+            until(
+                lambda: one.page.evaluate("() => document.activeElement.id") == "slot-1",
+                "the second slot has the focus",
+            )
+        until(
+            lambda: "'S1' is in slot 0 already" in one.page.inner_text(".tile:nth-child(2)"),
+            "the slot says what is wrong",
+        )
+        assert one.page.get_attribute("#slot-1", "aria-invalid") == "true"
+        one.page.fill("#slot-1", "S2")
+        one.page.press("#slot-1", "Enter")
+        until(lambda: one.page.evaluate("() => document.activeElement.id") == "slot-2", "the next slot has the focus")
+        assert one.page.locator(".tile [role=alert]:visible").count() == 0
+        assert one.page.locator("#faults option[value^=door]").count() == 1
+        one.page.select_option("select[name=recipe]", index=1)
+        one.press("text=Start the lot")
+        one.sees(".question")
+        until(lambda: one.page.evaluate("() => document.body.dataset.rung") == "2", "the bell rings")
+        assert one.page.title().startswith("Your turn")
+        one.press("[data-answer='go']")
+        one.sees("[data-name=station][data-drawn]")
+        assert [error for error in one.errors if "422" not in error] == []
+
+
+# without a browser, with broken runs and 500 units: tests/unit/pipelines/workbench/test_unusual_archives.py
+
+
+@pytest.fixture(scope="module")
+def unusual(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    top = tmp_path_factory.mktemp("unusual")
+    unusual_archive(top / "archive")
+    with served(top / "archive", top / "unusual") as one:
+        yield one
+
+
+def run_of(unusual: Served, start: str) -> str:
+    return next(path.name for path in (unusual.archive / "runs").iterdir() if path.name.startswith(start))
+
+
+def main_text(one: Tab) -> str:
+    return str(one.page.inner_text("main"))
+
+
+@pytest.mark.slow
+def test_a_finding_of_the_audit_leads_to_the_values_that_it_is_drawn_from(unusual: Served, browser: Any) -> None:
+    with tab(browser, unusual.address) as one:
+        one.open("/audit?until=2024-01-10")
+        one.sees("details.finding")
+        with_chart = one.page.locator("details.finding:has([data-figure])")
+        assert with_chart.count() >= 1
+        chosen = with_chart.first
+        name = chosen.get_attribute("data-finding")
+        chosen.locator("summary").click()
+        until(lambda: chosen.locator("[data-drawn]").count() == 1, "the evidence is drawn")
+        chosen.locator("text=Address of this finding").click()
+        one.ready()
+        opened = one.page.locator("details.finding[open]")
+        assert opened.count() == 1  # the address opens this finding, and no other
+        assert opened.get_attribute("data-finding") == name
+        until(lambda: opened.locator("[data-drawn]").count() == 1, "the evidence is drawn from its address")
+        numbers = one.page.request.get(
+            unusual.address + str(opened.locator("a:text-is('CSV')").get_attribute("href"))
+        ).text()
+        subject = str(name).split(".")[1]
+        # a chart that the page draws again has no points for a moment
+        points = "plot => (plot._fullData ?? []).reduce((n, t) => n + t.x.length, 0)"
+        until(lambda: opened.locator("[data-drawn]").evaluate(points) >= 2, "the points of the evidence are drawn")
+        assert len(numbers.splitlines()) > 2
+        assert subject in main_text(one)
+        opened.locator("table a").first.click()  # the run of the finding
+        until(lambda: "/run?" in one.href, "the run of the finding is opened")
+        one.ready()
+        assert one.findings() == []
+        assert one.errors == [] == one.outside
+
+
+@pytest.mark.slow
+def test_no_script_in_any_name_runs(unusual: Served, browser: Any) -> None:
+    pages = [*addresses(run_of(unusual, "named-")), "/operator?" + urlencode({"station": ""}), "/" + SCRIPT]
+    with tab(browser, unusual.address) as one:
+        for path in pages:
+            one.page.goto(unusual.address + path)
+            until(lambda: one.page.evaluate("() => Boolean(document.body.dataset.ready)"), path)
+            if path.startswith(("/unit?", "/run?")):
+                one.ready()
+                assert one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth") <= 0, path
+            assert one.page.evaluate("() => window.ran") is None, path
+            assert one.page.locator("main img, main script").count() == 0, path
+        assert one.outside == []

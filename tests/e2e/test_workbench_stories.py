@@ -1,34 +1,27 @@
-"""Long stories in a real browser: the demonstration's hidden effect, and an operator's lot with a fault, from two stations."""
+"""Long stories in a real browser: a hidden effect, a lot on a station like hardware, and both by keyboard alone."""
 
-import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from browser import ROOT, Tab, served, tab, until
+from browser import ROOT, Served, Tab, served, tab, until
 from capture_double import recipe_file
+from lots import lot
 from served_station import FAST, modbus_station, short_recipe_file, station_file
 from served_station import served as served_station
 from small_station import lot_of
 
+from benchmarks.generated_archive import write_archive
 from stations.safety.folder import read_log
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
-@pytest.fixture
-def pictures(tmp_path: Path) -> Path:
-    """Where the pictures of docs/how-to/workbench.md are made: TUMBLELINE_PICTURES, else the test's own folder."""
-    folder = Path(os.environ.get("TUMBLELINE_PICTURES") or tmp_path / "pictures")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
-def test_the_demonstration_from_its_measurement_to_the_error_falling(
-    tmp_path: Path, browser: Any, pictures: Path
-) -> None:
+def test_the_demonstration_from_its_measurement_to_the_error_falling(tmp_path: Path, browser: Any) -> None:
     folder = tmp_path / "bench"
     command = [sys.executable, "-m", "pipelines.cli", "demo", "cubic_transfer", "--seed", "1", "--by-hand"]
     subprocess.run([*command, "--folder", str(folder)], cwd=ROOT, check=True, capture_output=True, timeout=280)
@@ -37,15 +30,18 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         one.page.select_option("select[name=source]", str(folder / "dwells.parquet"))
         one.sees(".verdict")
         assert "; missing: third_order" in one.page.inner_text(".verdict")
+        order = one.page.evaluate(
+            """() => [".verdict", "[data-name=effect-0]", "[data-add]", ".command"].map(
+                (s) => document.querySelector(s).getBoundingClientRect().top)"""
+        )
+        assert order == sorted(order)
         one.press("text=as the fresh measurement")
         one.sees("[data-version='1']")
         assert one.page.locator("a[data-add=third_order]").first.inner_text() == "Add third_order"
-        one.shot(pictures, "workbench-before", tall=1340)
         one.press("[data-add='third_order']")
         one.sees("[data-version='2']")
         one.ready()
         assert one.page.inner_text(".verdict").startswith("ADEQUATE")
-        one.shot(pictures, "workbench-after", tall=1440)
         fresh = [float(one.page.get_attribute(f"[data-version='{k}']", "data-fresh") or "nan") for k in (1, 2)]
         assert fresh[1] < 0.6 * fresh[0]
         assert "confirmed" in one.page.inner_text("#errors")
@@ -64,53 +60,14 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         assert one.outside == [] == one.errors
 
 
-def begun(one: Tab, recipe: str | Path, *serials: str, fault: str = "") -> None:
+def begun(one: Tab, recipe: str | Path, *serials: str) -> None:
     """A lot that is started on the page of the operator, and asks for its units."""
     one.page.select_option("select[name=recipe]", str(recipe))
-    if fault:
-        one.page.fill("input[name=fault]", fault)
     for slot, serial in enumerate(serials):
         one.page.fill(f"#slot-{slot}", serial)
         one.page.press(f"#slot-{slot}", "Enter")
     one.press("text=Start the lot")
     one.sees(".question")
-
-
-def test_a_lot_with_an_open_door_is_measured_from_two_browsers(tmp_path: Path, browser: Any) -> None:
-    folder = tmp_path / "bench"
-    folder.mkdir()
-    recipe = recipe_file(folder)
-    with (
-        served(tmp_path / "archive", folder) as server,
-        tab(browser, server.address) as one,
-        tab(browser, server.address) as two,
-    ):
-        one.open("/operator")
-        begun(one, recipe, "A1", "A2", "A" * 64, fault="door:at_s=300")
-        assert "seat the units" in one.page.inner_text(".question").lower()
-        two.open("/operator")
-        two.sees("[data-answer='go']")
-        stale = two.page.evaluate(
-            """async () => { const b = document.querySelector("[data-answer=go]");
-            const proof = localStorage.getItem("tumbleline-change-proof");
-            const headers = { "content-type": "application/json", "x-change-proof": proof };
-            const send = () => fetch(b.dataset.act, { method: "POST", headers,
-                body: JSON.stringify({ number: b.dataset.number, answer: "go" }) });
-            return [(await send()).status, (await send()).status]; }"""
-        )
-        assert stale == [200, 409]
-        until(lambda: "door" in one.page.inner_text("main"), "the open door is told in words")
-        assert one.findings() == []
-        until(
-            lambda: one.page.locator("[data-phase=asks], [data-phase=stopped], [data-phase=failed]").count(),
-            "it needs a hand",
-        )
-        one.shot(tmp_path, "fault")
-        server.end()  # the lot's process does not need the server
-        server.begin()
-        two.open("/operator")
-        assert "door" in two.page.inner_text("main")
-        assert two.page.locator(".tile").count() >= 3
 
 
 def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_station(
@@ -138,8 +95,9 @@ def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_st
                 one.press(".tabs a >> nth=1")
                 until(lambda: "station=simulated" in one.href, "the second station")
                 begun(one, recipe, "B1")
-                one.shot(tmp_path, "two-stations")
             kept = {path: path.read_bytes() for path in tmp_path.glob("archive/captures/*/[0-9]*/record.json")}
+            server.end()  # a paused lot does not need the server
+            server.begin()
             with tab(browser, server.address) as again:  # the browser was closed, and is opened again
                 again.open("/operator")
                 again.sees("[data-phase=paused]")
@@ -156,3 +114,119 @@ def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_st
                 again.open("/operator?station=simulated")
                 again.press("[data-answer='stop']")
                 again.sees("[data-phase=stopped]")
+
+
+SIZES = {"screen": (1440, 900), "phone": (390, 844)}
+MOST_KEYS = 250
+FOCUS = """() => {
+    const e = document.activeElement, r = e.getBoundingClientRect(), s = getComputedStyle(e);
+    const x = Math.min(Math.max(r.left + Math.min(r.width / 2, 40), 1), innerWidth - 1);
+    const y = Math.min(Math.max((Math.max(r.top, 0) + Math.min(r.bottom, innerHeight)) / 2, 1), innerHeight - 1);
+    const top = document.elementFromPoint(x, y);
+    const drawn = s.outlineStyle !== "none" && parseFloat(s.outlineWidth) >= 2;
+    const inside = r.bottom > 0 && r.top < innerHeight && r.right > 0 && r.left < innerWidth && r.width > 0 && r.height > 0;
+    return { html: e.outerHTML.slice(0, 120), body: e === document.body, outline: drawn, inside, order: e.tabIndex,
+             covered: inside && !(e.contains(top) || top?.contains(e) || e.labels?.[0]?.contains(top)) };
+}"""
+
+
+@pytest.fixture(
+    params=[(size, dark) for size in SIZES for dark in (False, True)],
+    ids=lambda p: f"{p[0]}-{'dark' if p[1] else 'light'}",
+)
+def look(request: pytest.FixtureRequest) -> dict[str, Any]:
+    size, dark = request.param
+    return {"size": SIZES[size], "dark": dark}
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """A workbench with the calibrations of two years, a recipe, and nothing uploaded."""
+    top = tmp_path_factory.mktemp("keyboard")
+    write_archive(top / "archive", 16, years=2.0, seed=7, workers=1)
+    (top / "bench").mkdir()
+    recipe_file(top / "bench")
+    with served(top / "archive", top / "bench") as one:
+        yield one
+
+
+def is_seen(now: dict[str, Any]) -> bool:
+    """Whether the place with the focus has an outline, lies in the window, under nothing else, in the order of the page."""
+    return now["body"] or (now["outline"] and now["inside"] and not now["covered"] and now["order"] <= 0)
+
+
+def to(one: Tab, selector: str, key: str = "Tab") -> None:
+    """Press Tab until a place has the focus; on the way everything that has it is seen and in the order of the page."""
+    for _ in range(MOST_KEYS):
+        one.page.keyboard.press(key)
+        until(lambda: is_seen(one.page.evaluate(FOCUS)), f"what has the focus is seen: {one.page.evaluate(FOCUS)}", 3.0)
+        if one.page.evaluate("(s) => document.activeElement.matches(s)", selector):
+            return
+    raise AssertionError(f"{MOST_KEYS} keys do not lead to {selector} on {one.href}")
+
+
+def enter(one: Tab, selector: str) -> None:
+    to(one, selector)
+    one.page.keyboard.press("Enter")
+
+
+def seen(one: Tab, selector: str) -> None:
+    one.sees(selector)
+    one.ready()
+
+
+def test_a_file_is_uploaded_diagnosed_and_its_effect_added(
+    bench: Served, browser: Any, look: dict[str, Any], tmp_path: Path
+) -> None:
+    dwells = lot(np.random.default_rng(5), units=2, temperatures=(25.0,), hidden=lambda force, *_: 2e-4 * force**3)
+    dwells.to_parquet(tmp_path / "cubic.parquet")
+    with tab(browser, bench.address, **look) as one:
+        choosers: list[Any] = []
+
+        def kept(chooser: Any) -> None:
+            choosers.append(chooser)
+
+        one.page.on("filechooser", kept)  # before the key: a dialog that nobody listens for is closed at once
+        one.open("/upload")
+        to(one, "[data-drop]")
+        one.page.keyboard.press("Space")
+        until(lambda: one.page.evaluate("() => 1") and choosers, "the files can be chosen")
+        choosers[0].set_files(str(tmp_path / "cubic.parquet"))
+        seen(one, "a.button.main[href^='/missing']")
+        enter(one, "a.button.main[href^='/missing']")
+        seen(one, ".verdict")
+        assert "third_order" in one.page.inner_text(".verdict")
+        enter(one, "[data-add=third_order]")
+        until(lambda: one.page.inner_text(".verdict").startswith("ADEQUATE"), "the model with the effect is judged")
+        one.ready()
+        to(one, "[data-name='effect-0']")
+        one.page.keyboard.press("ArrowRight")
+        until(lambda: one.page.locator("[data-name='effect-0'] .hovertext").count() > 0, "the point says what it is")
+        one.page.keyboard.press("Escape")
+        until(lambda: one.page.locator("[data-name='effect-0'] .hovertext").count() == 0, "Escape lets it go")
+        to(one, "select[name=against]")
+        before = one.page.evaluate("() => document.activeElement.selectedIndex")
+        one.page.keyboard.press("ArrowDown")
+        until(lambda: "against=" in one.href, "the quantity is in the address")
+        one.ready()
+        assert one.page.evaluate("() => document.activeElement.name") == "against"  # the next key goes on from here
+        assert one.page.evaluate("() => document.activeElement.selectedIndex") == before + 1
+        enter(one, "[data-undo] + a, [data-undo] ~ a")
+        seen(one, "[data-changes]")
+        to(one, "[aria-label='Coefficients that differ']")
+        to(one, "[aria-label='Verdicts']", "Shift+Tab")  # and back: nothing traps the keys
+        assert one.findings() == []
+        assert one.errors == [] == one.outside
+
+
+def test_tab_leads_to_what_an_operator_and_an_auditor_press(bench: Served, browser: Any, look: dict[str, Any]) -> None:
+    with tab(browser, bench.address, **look) as one:
+        one.open("/operator")
+        assert one.page.evaluate("() => document.activeElement.id") == "slot-0"
+        to(one, "select[name=recipe]", "Shift+Tab")
+        to(one, "form[data-scan] button.main")
+        one.open("/audit")
+        enter(one, "[data-finding]:has(a[href^='/run']) > summary")
+        enter(one, "[data-finding][open] a[href^='/run']")
+        until(lambda: "/run?" in one.href, "the run of the finding is shown")
+        assert one.errors == [] == one.outside
