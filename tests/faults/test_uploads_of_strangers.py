@@ -109,7 +109,7 @@ LINES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*LINES, "a measured record"])
 def test_twenty_looks_at_once_take_less_than_a_gigabyte(settings: WorkbenchSettings, name: str) -> None:
-    line, megabytes = LINES.get(name, (text_of(64 * MB), 64))
+    line, megabytes = LINES[name] if name in LINES else (text_of(64 * MB), 64)
     content, packed = line * (megabytes * MB // len(line)), name.endswith("packed")
     page = uploaded(settings, "a.csv.gz" if packed else "a.csv", gzip.compress(content, 9) if packed else content)
     told, memory = looks(settings, page, 20)
