@@ -5,25 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from each import each
+from procedure_records import procedure_records
 from root_process import ROOT
-from stopped_capture import Stopped, Stopping
+from small_station import MemorySink, captured, plant_of
 
-from pipelines.archive import Archive
-from pipelines.capture.capture import capture
 from pipelines.jobs.recipes import load_limits, load_recipe
 from pipelines.procedures import PROCEDURES, figures_of_recipe, parts_of, refuse_unusable, roles_of
-from pipelines.procedures.recorded import nominal_device, procedure_record
-from pipelines.schedule.steps import steps
 from schemas.errors import OperatorNeeded, RecipeInvalid, StationRefused
 from schemas.lot import Lot, Unit
 from schemas.profile import Profile
-from schemas.progress import silent
 from schemas.recipe import Recipe
 from schemas.station import load_station
 from stations import open_station
 from stations.plant.families.acutrol_3000 import Centrifuge, radius_error
-from stations.plant.plant import Plant
 
 LOT = Lot(units=[Unit(serial="C1", slot=0), Unit(serial="C2", slot=1)], device="SF1500", seed=5)
 RATE = math.degrees(math.sqrt(20.0 * 9.80665 / 0.3))
@@ -101,6 +95,7 @@ HEAD = (
     '[[procedures]]\nkind = "centrifuge"\n'
 )
 PART = "scale = 0.007\nrecord_s = 1.0\nforces_g = [2.0, 10.0, 20.0, 30.0]\ndown_again = false\n"
+RADII = "radii_m = [0.5, 0.3]\n"
 
 
 def recipe_of(folder: Path, more: str) -> Recipe:
@@ -109,26 +104,15 @@ def recipe_of(folder: Path, more: str) -> Recipe:
     return load_recipe(str(path))
 
 
-def taken(folder: Path, more: str, stop_after: int | None = None):
-    """A capture in the archive of a folder; with ``stop_after`` it ends early, and the next call resumes it."""
-    recipe, records = recipe_of(folder, more), Archive(folder / "archive").capture("one")
-    sink = records if stop_after is None else Stopping(records, stop_after)
-    with open_station(load_station(), LOT, resume=sink.last_state(), roles=roles_of(recipe)) as station:
-        capture(station, recipe, LOT, sink, progress=silent, events=sink.events)
-    return recipe, records
+def taken(recipe: Recipe, sink: MemorySink | None = None) -> MemorySink:
+    return captured(recipe, LOT, sink=sink, roles=roles_of(recipe))
 
 
-def figures(folder: Path, more: str) -> dict[str, dict]:
+def figures(recipe: Recipe) -> dict[str, dict]:
     """Figures by unit and name, from the samples of a capture, with the texts of the findings."""
-    recipe, records = taken(folder, more)
-    readings = records.gathered("readings")
-    own = [
-        procedure_record(k, step.order, records.samples([k]), readings[readings["record"] == k])
-        for k, step in enumerate(steps(recipe))
-        if step.order is not None
-    ]
-    part, device = parts_of(recipe)[0], nominal_device(readings)
-    outcome = PROCEDURES["centrifuge"].evaluate(part, PROCEDURES["centrifuge"].reduce(part, own, device), device)
+    records, device = procedure_records(recipe, taken(recipe))
+    part, procedure = parts_of(recipe)[0], PROCEDURES["centrifuge"]
+    outcome = procedure.evaluate(part, procedure.reduce(part, records, device), device)
     texts = {unit: " · ".join(f.text for f in outcome.findings if f.unit == unit) for unit in outcome.figures}
     return {
         unit: {one.figure: one for one in of_unit} | {"text": texts[unit]} for unit, of_unit in outcome.figures.items()
@@ -136,7 +120,7 @@ def figures(folder: Path, more: str) -> dict[str, dict]:
 
 
 def test_figures_at_two_radii_agree_with_what_arm_and_units_really_are(tmp_path: Path) -> None:
-    by_unit, plant = figures(tmp_path, "radii_m = [0.5, 0.3]\n"), Plant(load_station(), LOT)
+    by_unit, plant = figures(recipe_of(tmp_path, RADII)), plant_of(lot=LOT)
     holes = [1.0 + radius_error(plant.bench, r) / r for r in (0.5, 0.3)]
     for k, unit in enumerate(plant.serials):
         own, gain = plant.bench.units[k], 1.0 + 1e-6 * plant.truth(unit).scale_ppm[2]
@@ -156,38 +140,35 @@ def test_figures_at_two_radii_agree_with_what_arm_and_units_really_are(tmp_path:
 
 
 def test_one_radius_leaves_the_offset_open_and_says_what_closes_it(tmp_path: Path) -> None:
-    by_name = figures(tmp_path, "radius_m = 0.3\n")["C1"]
+    by_name = figures(recipe_of(tmp_path, "radius_m = 0.3\n"))["C1"]
     assert not by_name["centrifuge_mass_offset_um"].identified
     assert "radii_m" in by_name["centrifuge_mass_offset_um"].note
-    plant = Plant(load_station(), LOT)
-    one, true = by_name["centrifuge_sensitivity_percent"], 1e-4 * plant.truth("C1").scale_ppm[2]
+    one, true = by_name["centrifuge_sensitivity_percent"], 1e-4 * plant_of(lot=LOT).truth("C1").scale_ppm[2]
     assert abs(one.value - true) < 3.0 * one.uncertainty  # the station mounts at the radius of the recipe
 
 
 @pytest.mark.slow
 def test_a_capture_at_two_radii_that_stops_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    more = "radii_m = [0.5, 0.3]\n"
-    for part in ("whole", "broken"):
-        (tmp_path / part).mkdir()
-    whole = taken(tmp_path / "whole", more)[1]
-    for stop in (3, 4, 2):  # within a mounting, before the reversed one, and before the other radius
-        with pytest.raises(Stopped):
-            taken(tmp_path / "broken", more, stop)
-    assert taken(tmp_path / "broken", more)[1].hash() == whole.hash()
+    recipe = recipe_of(tmp_path, RADII)
+    whole, broken = taken(recipe), MemorySink()
+    for broken.die_after in (3, 7, 9):  # within a mounting, before the reversed one, and before the other radius
+        with pytest.raises(KeyboardInterrupt):
+            taken(recipe, broken)
+    broken.die_after = 10**6
+    taken(recipe, broken)
+    assert broken.state == whole.state
+    assert all(broken.all(part).equals(whole.all(part)) for part in range(3))
 
 
-@each(
-    [
-        ("radii_m = [0.5, 0.3]\nradius_m = 0.5\n", "one of them is needed"),
+def test_radii_that_separate_nothing_are_refused(tmp_path: Path) -> None:
+    for more, words in (
+        (RADII + "radius_m = 0.5\n", "one of them is needed"),
         ("radii_m = [0.5, 0.501]\n", "closer than 2 %"),
         ("radii_m = [0.5]\n", "radii_m"),
-        ("radii_m = [0.5, 0.3]\nradius_um = 0.0\n", "state radius_um"),
-    ]
-)
-def test_radii_that_separate_nothing_are_refused(row: tuple[str, str], tmp_path: Path) -> None:
-    more, text = row
-    with pytest.raises(RecipeInvalid, match=text):
-        parts_of(recipe_of(tmp_path, more))
+        (RADII + "radius_um = 0.0\n", "state radius_um"),
+    ):
+        with pytest.raises(RecipeInvalid, match=words):
+            parts_of(recipe_of(tmp_path, more))
 
 
 def test_the_sample_of_two_radii_can_be_performed_by_a_centrifuge_that_can_be_told_the_radius(

@@ -8,22 +8,24 @@ import numpy as np
 import pytest
 from each import each
 from long_suites import mostly_slow
+from small_station import MemorySink, captured
 
 from pipelines.archive import Archive, Run
-from pipelines.capture.capture import capture
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job
 from pipelines.jobs.recipes import load_recipe
 from pipelines.procedures import roles_of
 from pipelines.stages.figures import UNITS
 from schemas.errors import OperatorNeeded
+from schemas.event import MemoryLog
 from schemas.fault import FaultOrder
 from schemas.limits import limits_of
 from schemas.lot import Lot, Unit
-from schemas.progress import silent
+from schemas.recipe import Recipe
 from schemas.station import load_station, with_faults
 from stations import open_station
 
+LOT = Lot(units=[Unit(serial="F1", slot=0), Unit(serial="F2", slot=1)], device="SF1500", seed=5)
 PARTS = {
     "sweep": "frequencies_hz = [40.0, 80.0, 120.0, 160.0, 320.0, 640.0, 900.0, "
     "1300.0]\nnominal_scale = 0.007\nlevel_g = 2.0\nrecord_s = 0.05\ncycles = 4",
@@ -36,7 +38,7 @@ PARTS = {
 }  # fmt: skip
 
 
-def recipe_of(folder: Path, name: str, more: str = ""):
+def recipe_of(folder: Path, name: str, more: str = "") -> Recipe:
     path = folder / "recipe.toml"
     path.write_text(
         'name = "trouble"\ndevice = "SF1500"\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n'
@@ -45,35 +47,27 @@ def recipe_of(folder: Path, name: str, more: str = ""):
     return load_recipe(str(path))
 
 
-def graded(folder: Path, recipe, figure: str, limit: float, *faults: FaultOrder) -> Run:
+def graded(folder: Path, recipe: Recipe, figure: str, limit: float, *faults: FaultOrder) -> Run:
     """A run of the recipe with one limit, up to its grades."""
     limits = limits_of({"name": "one", "figures": {figure: {"max": limit, "unit": UNITS[figure]}}}, UNITS)
-    runner = Runner(Job(recipe, limits, lot(), with_faults(load_station(), list(faults))), Archive(folder / "archive"))
+    runner = Runner(Job(recipe, limits, LOT, with_faults(load_station(), list(faults))), Archive(folder / "archive"))
     for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "procedures", "budget", "grade"):
         runner.stage(stage)
     return runner.run
 
 
-def lot() -> Lot:
-    return Lot(units=[Unit(serial="F1", slot=0), Unit(serial="F2", slot=1)], device="SF1500", seed=5)
-
-
-def take(folder: Path, name: str, faults: list[FaultOrder], archive: str):
-    records = Archive(folder / archive).capture("one")
-    recipe = recipe_of(folder, name)
-    with open_station(with_faults(load_station(), faults), lot(), roles=roles_of(recipe)) as station:
-        capture(station, recipe, lot(), records, progress=silent, events=records.events)
-        assert station.equipment
-    return records
+def take(recipe: Recipe, *faults: FaultOrder) -> tuple[MemorySink, MemoryLog]:
+    sink, events, config = MemorySink(), MemoryLog(), with_faults(load_station(), list(faults))
+    return captured(recipe, LOT, config, sink, events=events, roles=roles_of(recipe)), events
 
 
 @cache
 def undisturbed(name: str) -> tuple[float, set[int]]:
     """When the first recording on the equipment begins, s, and the records, of a run without a fault; once per process."""
     with TemporaryDirectory() as folder:
-        good = take(Path(folder), name, [], "good")
-        readings = good.gathered("readings")
-        return float(readings[readings["pose"] != "bias"]["start_s"].min()), good.finished()
+        good, _ = take(recipe_of(Path(folder), name))
+    readings = good.all(1)
+    return float(readings[readings["pose"] != "bias"]["start_s"].min()), good.finished()
 
 
 SPOILT = {
@@ -98,11 +92,10 @@ QUICK = {("sweep", "missed_trigger"), ("shock", "missed_trigger")}
 def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_path: Path) -> None:
     first, finished = undisturbed(name)
     fault = FaultOrder(kind=kind, at_s=max(0.0, first - 0.2), for_s=0.6)
-    again = take(tmp_path, name, [fault], "again")
-    events = [event for event in again.events.recorded() if event.kind == "spoilt"]
-    assert events
+    again, events = take(recipe_of(tmp_path, name), fault)
     assert again.finished() == finished
-    assert {"shock": "shock", "step_response": "step generator"}.get(name, "exciter") in events[0].reason
+    spoilt = next(event for event in events.recorded() if event.kind == "spoilt")
+    assert {"shock": "shock", "step_response": "step generator"}.get(name, "exciter") in spoilt.reason
 
 
 TROUBLE = {
@@ -120,7 +113,7 @@ TROUBLE = {
 @each(TROUBLE)
 def test_trouble_that_stays_ends_the_run_for_a_person(case: tuple[str, str], tmp_path: Path) -> None:
     with pytest.raises(OperatorNeeded, match=TROUBLE[case]):
-        take(tmp_path, case[0], [FaultOrder(kind=case[1])], "bad")
+        take(recipe_of(tmp_path, case[0]), FaultOrder(kind=case[1]))
 
 
 FIGURE = {
@@ -157,7 +150,7 @@ def test_a_shock_beyond_the_sheets_limit_changes_the_unit_for_good(tmp_path: Pat
 
 def test_a_centrifuge_that_is_left_alone_and_one_that_is_made_safe_stop(tmp_path: Path) -> None:
     recipe = recipe_of(tmp_path, "centrifuge")
-    with open_station(load_station(), lot(), roles=roles_of(recipe)) as station:
+    with open_station(load_station(), LOT, roles=roles_of(recipe)) as station:
         machine = station.equipment["centrifuge"]
         machine.spin(200.0, 1, 0.5, [0, 1])
         assert machine.values.number("rate_read") == pytest.approx(200.0)

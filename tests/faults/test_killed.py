@@ -2,35 +2,68 @@
 
 import os
 import signal
-import subprocess
-import sys
 from io import BytesIO
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import AT_ROOM, BRIEF, PulledPlug, recipe_file, small_job
-from root_process import ROOT
+from capture_double import AT_ROOM, recipe_file
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, files
+from pipelines.archive.cleaning import clean
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
+from pipelines.jobs.job import Request
 from stations.plant.plant import PlantClock
 
 PATIENCE_S = 120.0
-RESULTS = ("readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "verification")
-MORE_RESULTS = ("noise", "allan", "noise", "figures", "grades")
+RESULTS = (
+    "readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "verification", "noise", "allan",
+    "figures", "grades",
+)  # fmt: skip
 TIMES, CHAINS = 50, 5
 
 
-def run(folder: Path, *how: str) -> int:
+def die() -> None:
+    """Ends the process as a power cut would."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def dying(folder: Path, how: str) -> None:
+    """A run that kills itself where it is told: plant:SECONDS | stage:NAME | file:NUMBER."""
+    kind, _, value = how.partition(":")
+    sleep, write, written = PlantClock.sleep, files._write_durably, list[Path]()
+
+    def until(clock: PlantClock, span: float) -> None:
+        left = float(value) - clock.now()
+        sleep(clock, min(left, span))
+        if left <= span:
+            die()
+
+    def aside(path: Path, data: bytes) -> None:
+        """So many files are written aside, and the last is not yet in its place."""
+        write(path, data)
+        written.append(path)
+        if len(written) == int(value):
+            die()
+
+    if kind == "plant":
+        PlantClock.sleep = until
+    if kind == "file":
+        files._write_durably = aside
+    for done in Runner(Request(recipe=str(folder / "small.toml")).job(), Archive(folder / "archive")).all():
+        if how == f"stage:{done.stage}":
+            die()
+
+
+def run(folder: Path, how: str = "") -> int | None:
     """Status of a run that may kill itself."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "tests")))}
-    command = [sys.executable, str(Path(__file__).with_name("dying.py")), str(folder / "small.toml")]
-    return subprocess.run(
-        [*command, str(folder / "archive"), *how], env=environment, timeout=PATIENCE_S, check=False
-    ).returncode
+    process = get_context("spawn").Process(target=dying, args=(folder, how), daemon=True)
+    process.start()
+    process.join(PATIENCE_S)
+    return process.exitcode
 
 
 def records(folder: Path) -> dict[str, tuple[int, int]]:
@@ -54,7 +87,7 @@ def finish(folder: Path) -> dict[str, bytes]:
     assert {name: records(folder)[name] for name in before} == before
     assert not list(folder.glob("archive/**/.tmp-*"))
     [run_folder] = (folder / "archive" / "runs").iterdir()
-    return {name: (run_folder / f"{name}.parquet").read_bytes() for name in (*RESULTS, *MORE_RESULTS)}
+    return {name: (run_folder / f"{name}.parquet").read_bytes() for name in RESULTS}
 
 
 @pytest.fixture(scope="module")
@@ -101,32 +134,15 @@ def test_a_run_killed_there_ends_in_the_same_bytes(tmp_path: Path, undisturbed: 
 
 
 @pytest.mark.slow
-def test_a_plug_pulled_at_random_times_loses_no_finished_dwell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    job = small_job(tmp_path, *BRIEF)
-    whole = Runner(job, Archive(tmp_path / "whole"))
-    whole.stage("capture")
-    length = station_seconds({"readings": (whole.run.path / "readings.parquet").read_bytes()})
-    sleep, ends = PlantClock.sleep, [0.0]
-
-    def fatal(clock: PlantClock, span: float) -> None:
-        sleep(clock, span)
-        if clock.now() > ends[0]:
-            raise PulledPlug
-
-    pulled = Archive(tmp_path / "pulled")
-    for end in np.sort(np.random.default_rng(1).uniform(1.0, length, 3)):
-        ends[0] = float(end)
-        monkeypatch.setattr(PlantClock, "sleep", fatal)
-        with pytest.raises(PulledPlug):
-            Runner(job, pulled).stage("capture")
-        monkeypatch.setattr(PlantClock, "sleep", sleep)
-    again = Runner(job, pulled)
-    again.stage("capture")
-    for name in ("readings", "history"):
-        path = f"{name}.parquet"
-        assert (again.run.path / path).read_bytes() == (whole.run.path / path).read_bytes()
-    kept = [list(archive.capture(whole.job.capture_id).samples()) for archive in (pulled, Archive(tmp_path / "whole"))]
-    assert all(left.equals(right) for left, right in zip(*kept, strict=True))
+def test_what_a_killed_writer_leaves_is_taken_away_by_clean(tmp_path: Path) -> None:
+    recipe_file(tmp_path)
+    killed(tmp_path, "file:7")
+    archive = Archive(tmp_path / "archive")
+    left = sorted(str(path) for path in archive.root.rglob(f"{files.TEMPORARY}*"))
+    assert left
+    assert sorted(clean(archive, only_look=True).removed) == left
+    assert sorted(clean(archive).removed) == left
+    assert not list(archive.root.rglob(f"{files.TEMPORARY}*"))
 
 
 ENDS_EARLY = (
@@ -140,11 +156,6 @@ ENDS_EARLY = (
     ),
 )
 OFFSETS = 'name = "offsets"\ngrade = "none"\n[figures]\nzero_g_offset_mg = { max = 75.0, unit = "mg" }\n'
-
-
-def ending_early(folder: Path) -> None:
-    recipe_file(folder, *ENDS_EARLY)
-    (folder / "offsets.toml").write_text(OFFSETS, encoding="utf-8")
 
 
 def decided(folder: Path) -> list[tuple[str, int, str]]:
@@ -162,7 +173,8 @@ def test_a_lot_that_ends_early_is_killed_and_decides_the_same(tmp_path: Path) ->
     whole, again = tmp_path / "whole", tmp_path / "again"
     for folder in (whole, again):
         folder.mkdir()
-        ending_early(folder)
+        recipe_file(folder, *ENDS_EARLY)
+        (folder / "offsets.toml").write_text(OFFSETS, encoding="utf-8")
     results = finish(whole)
     looks = decided(whole)
     assert [kind for kind, _, _ in looks if kind == "known"] == ["known"]

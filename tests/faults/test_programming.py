@@ -5,17 +5,18 @@ import re
 import shlex
 import signal
 import struct
-import subprocess
-import sys
 import zlib
+from multiprocessing import get_context
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from capture_double import small_job, small_run
+from driven_station import told
+from in_process import refused, text_of
 from programmed_lot import LOT, copied_lot, keep_state, plant_of, programmed
 from root_process import ROOT
+from served_station import modbus_station, served_plant
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
@@ -31,9 +32,12 @@ from pipelines.export.device_block import HEAD, LENGTH, Form, block_of, pack, un
 from pipelines.integrity import verify
 from pipelines.jobs.job import Job
 from pipelines.programming import job, process
-from pipelines.programming.job import _held, chosen_units
+from pipelines.programming.job import _held, chosen_units, program_run, station_of
+from pipelines.programming.outcome import Choice
 from schemas.errors import ArchiveUnusable, OperatorNeeded, StationRefused, StationTimeout, WrongUse
 from schemas.fault import FaultOrder
+from schemas.lot import Lot
+from schemas.station import StationConfig
 from stations.codec import Value
 from stations.devices.memory import UnitMemory
 from stations.opening import serve_plant
@@ -47,6 +51,14 @@ COMMAND = next(r for r in load_profile("tumbleline_slot").registers if r.name ==
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     monkeypatch.setenv(VARIABLE, "")
     return copied_lot(tmp_path / "copy")
+
+
+@pytest.fixture
+def ledger(run: Run) -> Ledger:
+    """The ledger of the run, with a certificate of A1."""
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    return ledger
 
 
 def job_of(run: Run) -> Job:
@@ -104,13 +116,12 @@ DIFFERS = "differs from what was written"
         ("memory_bad_block", {"copy": 1, "word": 40}, "read back", f"{DIFFERS} from byte 80"),
         pytest.param("memory_worn", {}, "archive the memory", "worn out", marks=pytest.mark.slow),
         ("memory_power_lost", {"after_s": 0.45}, "read back", DIFFERS),
-        pytest.param("memory_power_lost", {"after_s": 0.1}, "read back", DIFFERS, marks=pytest.mark.slow),
     ],
 )
 def test_a_fault_leaves_the_valid_copy_and_no_certificate(
-    run: Run, kind: str, figures: dict[str, float], step: str, reason: str
+    run: Run, ledger: Ledger, kind: str, figures: dict[str, float], step: str, reason: str
 ) -> None:
-    certify(Ledger(run.archive.root), run, ["A1", "A2"])
+    certify(ledger, run, ["A2"])
     programmed(run)
     kept, plant = copies(run)[0], plant_of(run, job_of(run))
     plant.inject(FaultOrder(kind=kind, serial="A1", figures=figures, at_s=plant.now))
@@ -127,10 +138,10 @@ def test_a_fault_leaves_the_valid_copy_and_no_certificate(
         assert unproved(run.archive.root, "A1") == ""
         return
     assert "A1" not in given
-    assert Ledger(run.archive.root).valid_at("A1", today()) is None
+    assert ledger.valid_at("A1", today()) is None
     with pytest.raises(WrongUse, match="unit A1: the writing of its memory failed"):
-        certify(Ledger(run.archive.root), run, ["A1"])
-    assert "A1" in certify(Ledger(run.archive.root), run).left_out
+        certify(ledger, run, ["A1"])
+    assert "A1" in certify(ledger, run).left_out
     if kind == "memory_bad_block":
         assert done["A2"].outcome == "proved"  # the others go on
 
@@ -182,14 +193,11 @@ def test_a_block_is_what_its_layout_says_and_a_memory_that_is_erased_or_damaged_
         assert unpack(bytes(spoilt)) is None
 
 
-def packed(form: Form) -> bytes:
-    return pack(block_of(calibration(), form, sequence=1, certificate=0, date=0, offsets=(0, 0, 0), step=0))
-
-
 @pytest.mark.parametrize("form", ["float32", "q24"])
 def test_a_block_corrects_as_the_calibration(form: Form) -> None:
-    unit, block = calibration(), unpack(packed(form) + b"\xff" * 76)
-    output = np.array([[250000.0, -3000.0, 120000.0]])
+    unit = calibration()
+    content = pack(block_of(unit, form, sequence=1, certificate=0, date=0, offsets=(0, 0, 0), step=0))
+    block, output = unpack(content + b"\xff" * 76), np.array([[250000.0, -3000.0, 120000.0]])
     for t in (-10.0, 25.0, 60.0):
         np.testing.assert_allclose(block.correct(output, t), unit.correct(output, t), atol=5e-7)
 
@@ -225,144 +233,125 @@ def test_a_lost_answer_is_decided_by_the_counter_and_a_memory_that_samples_refus
     assert plant.flash[0].read(0, plant.now_us)[0] == 0x1234
 
 
-KILLED = """
-import os, signal, sys
-sys.path.insert(0, "tests")
-from pathlib import Path
-from pipelines.archive import Archive
-from pipelines.programming.job import chosen_units, program_run, station_of
-from pipelines.programming.outcome import Choice
-run = Archive(sys.argv[1]).run("latest")
+def writing(root: Path, step: str, config: StationConfig | None) -> None:
+    """A writing of A1 that kills its process at a step."""
 
-def report(text):
-    if sys.argv[2] in text:
-        os.kill(os.getpid(), signal.SIGKILL)
+    def report(text: str) -> None:
+        if step in text:
+            os.kill(os.getpid(), signal.SIGKILL)
 
-program_run(run, chosen_units(run, ["A1"]), station_of(run), Choice(), report)
-"""
+    run = Archive(root).run("latest")
+    program_run(run, chosen_units(run, ["A1"]), config or station_of(run), Choice(), report)
 
 
-LATER = ("A1: read back", "power cycle", "verify in pose")
+def killed(run: Run, ledger: Ledger, step: str, config: StationConfig | None = None) -> None:
+    """A writing that was killed leaves the unit without a certificate."""
+    words = (Path(str(run.archive.root)), step, config)
+    process = get_context("spawn").Process(target=writing, args=words, daemon=True)
+    process.start()
+    process.join(120.0)
+    assert process.exitcode == -signal.SIGKILL
+    assert ledger.valid_at("A1", today()) is None
+    assert "has no end" in unproved(run.archive.root, "A1")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("step", ["A1: write", *(pytest.param(step, marks=pytest.mark.slow) for step in LATER)])
-def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_written_again(run: Run, step: str) -> None:
-    ledger = Ledger(run.archive.root)
-    certify(ledger, run, ["A1"])
-    words = [sys.executable, "-c", KILLED, str(run.archive.root), step]
-    environment = {**os.environ, VARIABLE: ""}
-    done = subprocess.run(words, cwd=ROOT, check=False, capture_output=True, text=True, env=environment)
-    assert done.returncode == -signal.SIGKILL, done.stderr
-    assert ledger.valid_at("A1", today()) is None
-    assert "has no end" in unproved(run.archive.root, "A1")
+@pytest.mark.parametrize("step", ["A1: write", "A1: read back", "power cycle", "verify in pose"])
+def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_written_again(
+    run: Run, ledger: Ledger, step: str
+) -> None:
+    killed(run, ledger, step)
     with pytest.raises(WrongUse, match="has no end"):
         certify(ledger, run, ["A1"])
     again, given = programmed(run, ("A1",))
     assert again["A1"].outcome == "proved", again["A1"].reason
-    held = ledger.valid_at("A1", today())
-    assert held.certificate == given["A1"] == "A1/3"
-    written = again["A1"].block
-    assert written.certificate == 3
+    assert ledger.valid_at("A1", today()).certificate == given["A1"] == "A1/3"
+    assert again["A1"].block.certificate == 3
     assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "begun", "proved"]
 
 
-def test_the_command_asks_before_it_writes_and_what_was_revoked_is_not_written(run: Run) -> None:
-    ledger = Ledger(run.archive.root)
-    certify(ledger, run, ["A1"])
+@pytest.mark.slow
+def test_killed_on_hardware_the_watchdog_makes_the_station_safe_and_the_next_writing_proves(
+    run: Run, ledger: Ledger, state: Path
+) -> None:
+    with served_plant(lot=Lot.model_validate(run.about["lot"])) as (port, plant):
+        config = modbus_station(port)
+        killed(run, ledger, "A1: read back", config)
+        told("watchdog_safe")
+        [again], _ = program_run(
+            run, chosen_units(run, ["A1"]), config, Choice(tolerance_ug=5000.0), lambda _text: None
+        )
+        assert again.outcome == "proved", again.reason
+        with plant.lock:
+            held = [unpack(struct.pack(">192H", *plant.flash[0].read(copy, plant.now_us))) for copy in (0, 1)]
+            orders = [e for e in plant.journal.events() if getattr(e, "address", -1) == COMMAND]
+    assert sorted(block.sequence for block in held if block is not None) in ([1], [1, 2])
+    assert len(orders) == 2  # once for each writing
+    assert unproved(run.archive.root, "A1") == ""
+
+
+def test_the_command_asks_before_it_writes_and_what_was_revoked_is_not_written(run: Run, ledger: Ledger) -> None:
     ledger.revoke("A1", "fell to the floor", day=today())
     with pytest.raises(WrongUse, match="fell to the floor"):
         programmed(run, ("A1",))
     assert programming(run.archive.root, "A1") == []
-    words = ["station", "program", "latest", "--archive", str(run.archive.root), "--units", "A2"]
-    refused = CliRunner().invoke(app, words, input="")
-    assert isinstance(refused.exception, WrongUse)
-    no = CliRunner().invoke(app, words, input="n\n")
-    assert "nothing was written" in no.stdout
+    words = ["station", "program", "latest", "--archive", str(run.archive.root), "--units"]
+    assert isinstance(CliRunner().invoke(app, [*words, "A2"], input="").exception, WrongUse)
+    assert "nothing was written" in CliRunner().invoke(app, [*words, "A2"], input="n\n").stdout
     assert programming(run.archive.root, "A2") == []
-    yes = CliRunner().invoke(app, [*words, "--yes"])
-    assert yes.exit_code == 0, yes.exception
-    assert "proved" in yes.stdout
-    with pytest.raises(WrongUse, match="no unit B9"):
-        raise CliRunner().invoke(app, [*words[:-1], "B9", "--yes"]).exception or AssertionError
+    assert "proved" in text_of(*words, "A2", "--yes")
+    assert "no unit B9" in refused(*words, "B9", "--yes")
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("ledger")
 def test_the_guide_prints_what_the_command_prints(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     guide = (ROOT / "docs" / "how-to" / "program-the-device.md").read_text(encoding="utf-8")
     command, _, printed = re.findall(r"```console\n\$ (.*?)```", guide, flags=re.DOTALL)[0].partition("\n")
     monkeypatch.setenv("TUMBLELINE_ARCHIVE", str(run.archive.root))
-    monkeypatch.setenv("COLUMNS", "200")
-    certify(Ledger(run.archive.root), run, ["A1"])
-    done = CliRunner().invoke(app, shlex.split(command)[1:])
-    assert done.exit_code == 0, done.exception
-    wanted, shown = (re.sub(r"[─\s]+", " ", text).strip() for text in (printed, done.stdout))
-    assert re.fullmatch(re.escape(wanted).replace("…", ".*?"), shown), done.stdout
+    shown, wanted = (re.sub(r"[─\s]+", " ", text).strip() for text in (text_of(*shlex.split(command)[1:]), printed))
+    assert re.fullmatch(re.escape(wanted).replace("…", ".*?"), shown), shown
     assert str(LENGTH) in guide
 
 
-@pytest.mark.parametrize(("kind", "refusal"), [("emergency_stop", EmergencyStop), ("door", OperatorNeeded)])
-def test_nothing_is_written_while_the_emergency_stop_is_pressed_or_the_door_open(
-    run: Run, kind: str, refusal: type[OperatorNeeded]
-) -> None:
-    ledger = Ledger(run.archive.root)
-    certify(ledger, run, ["A1"])
-    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind=kind, at_s=0.0)))
-    with pytest.raises(refusal):
-        programmed(run, ("A1",))
-    assert programming(run.archive.root, "A1") == []
-    assert ledger.valid_at("A1", today()) is not None
-
-
-def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> None:
-    class Held:
-        """Calibrations of one run: the first was ended by a writing, the second by ``reason``."""
-
-        def __init__(self, reason: str) -> None:
-            self.reason = reason
-
-        def calibrations(self, _serial: str) -> list[SimpleNamespace]:
-            span = {"run": "r", "start": "2026-01-01", "stated_until": "2027-01-01", "holds": lambda _day: False}
-            return [
-                SimpleNamespace(number=n, ended_by=SimpleNamespace(reason=reason), **span)
-                for n, reason in enumerate([WRITING, self.reason], 1)
-            ]
-
-    assert _held(Held("superseded"), "A1", "r", "2026-06-01") is None
-    interrupted = _held(Held(WRITING), "A1", "r", "2026-06-01")
-    assert interrupted.number == 2
-
-
 @pytest.mark.parametrize(
-    "change",
-    [
-        pytest.param(("temperatures_C = [0.0, 50.0]", "temperatures_C = [0.0, 51.0]"), marks=pytest.mark.slow),
-        ('"small"', '"later"'),
-    ],
-    ids=["measured later", "the same data again"],
+    ("kind", "after_s", "events"), [("emergency_stop", 0.0, []), ("door", 0.0, []), ("door", 6.0, ["begun", "failed"])]
 )
-def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change: tuple[str, str]) -> None:
-    ledger = Ledger(run.archive.root)
-    certify(ledger, run, ["A1"])
+def test_nothing_is_written_while_the_emergency_stop_is_pressed_or_the_door_open_and_an_opened_door_ends_it(
+    run: Run, ledger: Ledger, kind: str, after_s: float, events: list[str]
+) -> None:
+    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind=kind, at_s=plant.now + after_s)))
+    with pytest.raises(EmergencyStop if kind == "emergency_stop" else OperatorNeeded):
+        programmed(run, ("A1",))
+    assert [entry["event"] for entry in programming(run.archive.root, "A1")] == events
+    assert (ledger.valid_at("A1", today()) is None) == bool(events)
+
+
+def test_a_calibration_that_ended_for_another_reason_does_not_come_back(run: Run, ledger: Ledger) -> None:
+    ledger.revoke("A1", WRITING, day=today())
+    assert _held(ledger, "A1", run.id, today()).event.sequence == 1
+    certify(ledger, run, ["A1"], reason="given again")
+    ledger.revoke("A1", "dropped", day=today())
+    assert _held(ledger, "A1", run.id, today()) is None
+
+
+def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, ledger: Ledger) -> None:
     ledger.revoke("A1", WRITING, day=today())  # a writing of this run began once and was not completed
-    other = small_run(Path(str(run.archive.root)).parent, None, *LOT, change)
+    other = small_run(Path(str(run.archive.root)).parent, None, *LOT, ('"small"', '"later"'))
     certify(ledger, other, ["A1"])
     words = rf"certificate A1/3 is of run {re.escape(other.id)}.*not after it; write that run"
     with pytest.raises(WrongUse, match=words):
         programmed(run, ("A1",))
-    held = ledger.valid_at("A1", today())
-    assert held.run == other.id
+    assert ledger.valid_at("A1", today()).run == other.id
     assert programming(run.archive.root, "A1") == []
     programmed(run, ("A2",))  # the other units are not concerned
 
 
 @pytest.mark.slow
 def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_device_does_not_have(
-    run: Run, monkeypatch: pytest.MonkeyPatch
+    run: Run, ledger: Ledger, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ledger = Ledger(run.archive.root)
-    certify(ledger, run, ["A1"])
-    real = job.open_lot
+    real, real_certify = job.open_lot, job.certify
 
     def meanwhile(*words: object) -> object:
         ledger.revoke("A1", "by another process", day=today())
@@ -372,10 +361,7 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
     with monkeypatch.context() as patch:
         patch.setattr(job, "open_lot", meanwhile)
         done, given = programmed(run, ("A1",))
-    block = done["A1"].block
-    assert given == {"A1": f"A1/{block.certificate}"} == {"A1": "A1/5"}
-
-    real_certify = job.certify
+    assert given == {"A1": f"A1/{done['A1'].block.certificate}"} == {"A1": "A1/5"}
 
     def late(*words: object, **more: object) -> object:
         real_certify(ledger, run, ["A1"], months=2)  # a process that had looked before the writing began
@@ -388,18 +374,8 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
     assert (done["A1"].outcome, done["A1"].step) == ("failed", "certify")
     assert ledger.valid_at("A1", today()) is None
     again, given = programmed(run, ("A1",))
-    written = again["A1"].block
     assert again["A1"].outcome == "proved"
-    assert given == {"A1": f"A1/{written.certificate}"}
-
-
-def test_a_door_that_is_opened_ends_the_verification(run: Run) -> None:
-    certify(Ledger(run.archive.root), run, ["A1"])
-    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="door", at_s=plant.now + 6.0)))
-    with pytest.raises(OperatorNeeded, match="door is open"):
-        programmed(run, ("A1",))
-    assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "failed"]
-    assert Ledger(run.archive.root).valid_at("A1", today()) is None
+    assert given == {"A1": f"A1/{again['A1'].block.certificate}"}
 
 
 def test_a_failure_that_cannot_be_recorded_hides_neither_its_cause_nor_the_other_units(

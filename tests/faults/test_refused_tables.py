@@ -1,6 +1,6 @@
-"""What import and the exchange format refuse: one message that names place, value and remedy."""
+"""What import, exchange format, recipes and manifests refuse: one message that names place, value and remedy."""
 
-import gzip
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,18 +8,22 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import recordings
 from each import each
-from in_process import given
+from in_process import given, text_of
 from lots import lot
-from scipy.io import savemat
+from root_process import ROOT
 
-from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
+from pipelines.archive import files as archive_files
 from pipelines.importers import exchange, files
 from pipelines.importers.mapping import Mapping, build, pairs
 from pipelines.importers.record import imported
 from pipelines.jobs.recipes import load_recipe, lot_of
-from pipelines.tables.dwell_table import covariates
-from schemas.errors import DataRejected, RecipeInvalid, WrongUse
+from pipelines.jobs.seating import Seating, scan
+from pipelines.procedures import parts_of
+from schemas.errors import ArchiveUnusable, DataRejected, RecipeInvalid, TumblelineError, WrongUse
+from schemas.model import ModelFile
+from schemas.toml_files import parse_as, parse_toml
 
 Change = Callable[[pd.DataFrame], pd.DataFrame]
 CONTENT: dict[str, Any] = {
@@ -112,17 +116,17 @@ def test_dwells_that_cannot_be_are_refused(row: tuple[Change, str], tmp_path: Pa
         exchange.read_dwells(tmp_path / "dwells.csv")
 
 
-@each(
-    [
-        (b"", "no rows of data"),
-        (b"a,b,c\n", "no rows of data"),
-        (b"a,b\n1,2\n3,4,5\n", "do not have the 2 columns"),
-        (b"a,b\n1,2\n3,4,5,6\n", "do not have the 2 columns"),
-        (b"a,a\n1,2\n", "column 'a' is there twice"),
-        (b"\x00\xff\xfe\x01", "neither text"),
-        (b"\x89HDF\r\n\x1a\n", "MATLAB 7.3"),
-    ]
-)
+NO_TABLES = [
+    (b"", "no rows of data"),
+    (b"a,b,c\n", "no rows of data"),
+    (b"a,b\n1,2\n3,4,5\n", "do not have the 2 columns"),
+    (b"a,a\n1,2\n", "column 'a' is there twice"),
+    (b"\x00\xff\xfe\x01", "neither text"),
+    (b"\x89HDF\r\n\x1a\n", "MATLAB 7.3"),
+]
+
+
+@each(NO_TABLES, repr)
 def test_files_that_are_no_tables_are_refused(row: tuple[bytes, str], tmp_path: Path) -> None:
     content, words = row
     (tmp_path / "file.csv").write_bytes(content)
@@ -130,25 +134,24 @@ def test_files_that_are_no_tables_are_refused(row: tuple[bytes, str], tmp_path: 
         files.read(tmp_path / "file.csv")
 
 
-@each(
-    [
-        ({"units": {"output": "G"}}, "known unit of the output is needed: g, mg"),
-        ({"units": {"output": "g", "tme": "s"}}, "not known; did you mean time"),
-        ({"columns": {"x": "a", "y": "b"}}, "^test: z not mapped"),
-        ({"axes": ["x", "x", "z"]}, "every axis is needed once"),
-        ({"poses": {"up": "z"}}, r"found 'z', one of \+x"),
-        ({"local_gravity_m_s2": 1.0}, "local_gravity_m_s2"),
-        ({"unitt": "A"}, "not known; did you mean unit"),
-        *(
-            (
-                {"columns": {**CONTENT["columns"], name: "t"}},
-                f"'{name}' is the name of a column that an import writes.*{cure}",
-            )
-            for name, cure in (("kind", "another name"), ("time_s", "map it as 'time'"), ("out_x", "map it as 'x'"))
-        ),
-        ({"columns": {**CONTENT["columns"], "temperature": "t", "unit_C": "u"}}, "temperature is mapped twice"),
-    ]
-)
+SLIPS = [
+    ({"units": {"output": "G"}}, "known unit of the output is needed: g, mg"),
+    ({"units": {"output": "g", "tme": "s"}}, "not known; did you mean time"),
+    ({"columns": {"x": "a", "y": "b"}}, "^test: z not mapped"),
+    ({"axes": ["x", "x", "z"]}, "every axis is needed once"),
+    ({"poses": {"up": "z"}}, r"found 'z', one of \+x"),
+    ({"local_gravity_m_s2": 1.0}, "local_gravity_m_s2"),
+    ({"unitt": "A"}, "not known; did you mean unit"),
+    (
+        {"columns": {**CONTENT["columns"], "kind": "t"}},
+        "'kind' is the name of a column that an import writes.*another name",
+    ),
+    ({"columns": {**CONTENT["columns"], "out_x": "t"}}, "'out_x' is the name of a column .*map it as 'x'"),
+    ({"columns": {**CONTENT["columns"], "temperature": "t", "unit_C": "u"}}, "temperature is mapped twice"),
+]
+
+
+@each(SLIPS, lambda row: row[1])
 def test_mappings_with_a_slip_are_refused(row: tuple[dict, str]) -> None:
     content, words = row
     with pytest.raises(RecipeInvalid, match=words):
@@ -174,14 +177,70 @@ def test_refusals_of_a_record_of_nobody_pairs_without_a_sign_dates_elsewhere_and
 
 def test_history_needs_a_temperature_and_each_time_once(tmp_path: Path) -> None:
     path = tmp_path / "history.csv"
-    for times, name, words in (([2.0, 1.0], "unit_C", ""), ([1.0, 1.0], "unit_C", "is there twice"),
-                               ([1.0, 2.0], "temp", "neither unit_C nor chamber_C")):  # fmt: skip
-        pd.DataFrame({"time_s": times, name: [20.0, 21.0]}).to_csv(path, index=False)
-        if not words:
-            assert exchange.read_history(path)["time_s"].tolist() == [1.0, 2.0]
-            continue
+    for times, name, words in (
+        ([1.0, 1.0], "unit_C", "is there twice"),
+        ([1.0, 2.0], "temp", "neither unit_C nor chamber_C"),
+    ):
+        pd.DataFrame({"time_s": times, name: 20.0}).to_csv(path, index=False)
         with pytest.raises(DataRejected, match=words):
             exchange.read_history(path)
+    pd.DataFrame({"time_s": [2.0, 1.0], "unit_C": 20.0}).to_csv(path, index=False)
+    assert exchange.read_history(path)["time_s"].tolist() == [1.0, 2.0]
+
+
+# -- recipes, models, manifests and slot maps beyond all bounds --------------------------------------------------------
+
+RECIPE = ROOT / "schemas" / "samples" / "production.toml"
+LAST = 'limits = "production"\n'
+BEYOND = [  # a piece of the recipe, what stands in its place, what is told
+    ("soak_min_s = 900.0", "soak_min_s = 9e302", "'soak_min_s': found 9e\\+302"),
+    ("dwell_s = 10.0", "dwell_s = true", "true and false are not numbers"),
+    ("seed = 1", 'seed = "1"', "'seed': found '1': a text, a number without quotes is needed"),
+    (LAST, LAST + '[[procedures]]\nkind = "bias_stability"\npose_deg = ["1", 0]\n', "'pose_deg': a text, a number"),
+    (LAST, LAST + '[[procedures]]\nkind = "exposure"\nlow_C = "1"\n', "'low_C': found '1': a text"),
+    ("dwell_s = 10.0", "dwell_s = -10.0", "'dwell_s': found -10"),
+    ("settle_s = 2.0", "settle_s = 1e300", "'settle_s': found 1e\\+300"),
+    ("settle_s = 2.0", "settle_s = 1e6", "days, at most 366 are possible"),
+    ("rate_hz = 100.0", "rate_hz = 1e200", "'rate_hz': found 1e\\+200"),
+    ("rate_hz = 100.0", "rate_hz = 1e6", "static_record_s: 1.2e\\+09 samples in one record"),
+    ("static_record_s = 1200.0", "static_record_s = 1e18", "'static_record_s': found"),
+    ("[-10.0, 25.0, 60.0]", "[-400.0, 25.0]", "'temperatures_C', number 1: found -400"),
+    ("seed = 1", "seed = -1", "'seed': found -1"),
+    ("seed = 1", f"seed = 0x{'f' * 6000}", "'seed': found a int too large to show"),
+    ("verification_repeats = 3", "verification_repeats = 9999999999", "'verification_repeats'"),
+    ('name = "production"', f'name = "{"x" * 5000}"', "'name'"),
+    ("seed = 1", f"seed.{'a.' * 3000}b = 1", "deep in one another|nested too deeply"),
+    ("[[35.0, 15.0]", "[[1e200, 15.0]", "verification"),
+]
+
+
+@each(BEYOND, lambda row: row[1][-60:])
+def test_recipes_beyond_all_bounds_are_refused_with_their_key(row: tuple[str, str, str], tmp_path: Path) -> None:
+    (old, new, words), text = row, RECIPE.read_text()
+    assert old in text
+    (tmp_path / "r.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(RecipeInvalid, match=words) as refused:
+        parts_of(load_recipe(str(tmp_path / "r.toml")))
+    assert len(str(refused.value)) < 700
+
+
+def test_nesting_and_long_integers_end_in_one_message_everywhere(tmp_path: Path) -> None:
+    for text in ("a = " + "[" * 9999, "a = " + "{b=" * 9999, f"a = {'1' * 9999}"):
+        with pytest.raises(RecipeInvalid, match="not valid TOML"):
+            parse_toml(text, "f")
+        with pytest.raises(RecipeInvalid):
+            parse_as(ModelFile, text, "f")
+    for text in ("[" * 100_000, '{"a": ' * 100_000, f'{{"a": {"1" * 9999}}}'):
+        with pytest.raises(ArchiveUnusable, match="not a manifest"):
+            archive_files.parsed(text.encode(), tmp_path / "m.json")
+    (tmp_path / "r.toml").write_bytes(b"\xef\xbb\xbf" + RECIPE.read_bytes())
+    assert load_recipe(str(tmp_path / "r.toml")).name == "production"  # a mark at the beginning is read over
+
+
+def test_each_scan_is_checked_when_it_is_scanned() -> None:
+    lines, words = iter(["=cmd|x", "A1", "АВ", "..", "B2"]), []
+    assert scan(2, lambda _slot: next(lines), words.append) == Seating(("A1", "B2"), (0, 1))
+    assert [text.split(":")[0] for text in words] == ["slot 0", "slot 1", "slot 1"]
 
 
 # -- what is right is taken ---------------------------------------------------------------------------------------------
@@ -199,15 +258,6 @@ def test_axes_signs_and_units_are_applied() -> None:
     assert len(recording.samples) == 400
     row = recording.dwells.iloc[0]
     assert [row["out_x"], row["out_y"], row["unit_C"]] == pytest.approx([-0.6, 0.0, 27.0], abs=1e-3)
-
-
-def test_text_with_a_comment_and_structures_and_matrices_of_matlab_are_read(tmp_path: Path) -> None:
-    (tmp_path / "c.txt").write_text("# made by hand\nt ax\n0  1\n0.5  2\n", encoding="utf-8")
-    assert files.read(tmp_path / "c.txt")[0].to_numpy().tolist() == [[0.0, 1.0], [0.5, 2.0]]
-    savemat(tmp_path / "e.mat", {"imu": {"acc": np.arange(12.0).reshape(4, 3)}, "fs": 100.0})
-    assert list(files.read(tmp_path / "e.mat")[0].columns) == ["imu.acc_1", "imu.acc_2", "imu.acc_3"]
-    (tmp_path / "f.csv.gz").write_bytes(gzip.compress(b"t,ax\n0,1\n"))
-    assert len(files.read(tmp_path / "f.csv.gz")[0]) == 1
 
 
 @each(["ns", "us", "ms", "s"])
@@ -234,34 +284,112 @@ def test_units_one_after_another_or_in_turn_may_each_begin_their_own_time(*, alt
         imported(back, mapping, "f")
 
 
-def test_serials_of_digits_stay_text_and_dwells_keep_their_order_and_covariates(tmp_path: Path) -> None:
+# -- names that could be a formula or markup, and serials of digits ------------------------------------------------------
+
+
+def test_serials_of_digits_stay_text_and_one_dwell_of_a_unit_needs_no_second_time(tmp_path: Path) -> None:
     dwells().iloc[::-1].assign(unit=17).to_csv(tmp_path / "d.csv", index=False)
-    frame = exchange.read_dwells(str(tmp_path / "d.csv"))
-    assert frame["unit"].tolist() == ["17"] * 4
-    assert frame["dwell"].tolist() == [0, 1, 2, 3]
-    assert covariates(frame) == ["hum"]
-    assert len(exchange.checked(dwells(1), where="f.csv")) == 1  # one dwell of a unit needs no second time
-
-
-# -- names that could be a formula or markup ----------------------------------------------------------------------------
+    assert exchange.read_dwells(str(tmp_path / "d.csv"))["unit"].tolist() == ["17"] * 4
+    assert len(exchange.checked(dwells(1), where="f.csv")) == 1
 
 
 @pytest.mark.slow
 def test_a_column_called_like_a_formula_is_written_as_it_is(tmp_path: Path, rng: np.random.Generator) -> None:
     name = "$\\frac{x$"
-    frame = lot(rng, units=1, temperatures=(25.0, 60.0))
+    frame = lot(rng, units=1, temperatures=(25.0, 60.0)).assign(温度=1.0)
     frame[name] = rng.normal(size=len(frame))
-    frame["温度"] = rng.normal(size=len(frame))
     frame["out_x"] += 1e-3 * frame[name]
     frame.to_csv(tmp_path / "d.csv", index=False)
-    page = tmp_path / "page.html"
-    status, _, message = given("diagnose", tmp_path / "d.csv", "--output", page)
-    assert status == 1, message
-    assert page.read_text().count(name) > 1
+    text_of("diagnose", tmp_path / "d.csv", "--output", tmp_path / "page.html", status=1)
+    assert (tmp_path / "page.html").read_text().count(name) > 1
 
 
-def test_no_text_of_a_picture_is_a_formula_or_markup() -> None:
-    nothing = Trace("<b>a</b>", np.zeros(1), np.zeros(1))
-    drawn = svg_text(Chart("a", (Plot("$a$ 温度", PlotAxis("$\\frac{x$"), PlotAxis("<i>y"), (nothing,)),)))
-    assert all(text in drawn for text in ("$\\frac{x$", "$a$ 温度"))
-    assert not any(tag in drawn for tag in ("<i>", "<b>"))
+# -- mistakes of unit, time and axis: refused, or told in a remark that asks to check -------------------------------------
+
+
+FEW, MANY, SEED = 30, 300, 5_611_072
+G = recordings.G
+SIZES = {"g": 1.0, "mg": 1e3, "m/s^2": G}
+
+
+def sound(rng: np.random.Generator) -> tuple[recordings.Recording, dict, pd.DataFrame]:
+    """A recording in some unit with a clock of some unit, and the mapping that is right for it."""
+    unit = str(rng.choice(["g", "mg", "m/s^2", "LSB", "V", "mV"]))
+    per_g = {**SIZES, "LSB": float(rng.choice([256, 4096, 16384])), "V": 0.66, "mV": 660.0}[unit]
+    noise = max(3e-4 * per_g, 0.4 if unit == "LSB" else 0.0)
+    faces = bool(rng.random() < 0.4)
+    one = recordings.recording(
+        rng,
+        rate=float(rng.choice([50.0, 100.0, 200.0, 400.0])),
+        per_g=per_g,
+        noise=noise,
+        directions=recordings.FACES if faces else None,
+    )
+    if unit == "LSB":
+        one = dataclasses.replace(one, output=np.round(one.output))
+    clock = str(rng.choice(["s", "ms", "us"]))
+    time = one.time * {"s": 1.0, "ms": 1e3, "us": 1e6}[clock]
+    frame = recordings.table(one, t=time if clock == "s" else np.round(time).astype(np.int64))
+    frame = frame.assign(
+        gx=rng.normal(0.0, 0.02, len(frame)), mx=0.4 + rng.normal(0.0, 1e-3, len(frame)), heat=24.0 + 1e-4 * one.time
+    )
+    content = {"columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "unit": "A1"}
+    content["units"] = {"output": unit, "time": clock}
+    if faces:
+        frame["part"] = "move"
+        for (start, stop), face in zip(one.spans, ("+x", "-x", "+y", "-y", "+z", "-z"), strict=True):
+            frame.loc[start : stop - 1, "part"] = face
+        content["columns"]["dwell"] = "part"
+        content |= {"poses": {face: face for face in set(frame["part"]) - {"move"}}, "local_gravity_m_s2": G}
+    return one, content, frame
+
+
+def mistaken(rng: np.random.Generator, content: dict, *, faces: bool) -> tuple[str, dict]:
+    """The mapping with one mistake in it."""
+    kinds = ["unit of time", "unit of output", "column twice", "other quantity", *(["axes", "sign"] if faces else [])]
+    kind = str(rng.choice(kinds))
+    columns, units = dict(content["columns"]), dict(content["units"])
+    if kind == "unit of time":
+        units["time"] = str(rng.choice([unit for unit in ("s", "ms", "us", "ns") if unit != units["time"]]))
+    elif kind == "unit of output":
+        others = {"g": ["mg", "m/s^2", "LSB", "mV"], "mg": ["g", "m/s^2", "LSB", "V"], "m/s^2": ["g", "mg", "LSB", "mV"],
+                  "LSB": ["g", "m/s^2", "V"], "V": ["mg", "m/s^2", "mV"], "mV": ["g", "m/s^2", "V"]}  # fmt: skip
+        units["output"] = str(rng.choice(others[units["output"]]))
+    elif kind == "column twice":
+        one, other = rng.permutation(["x", "y", "z"])[:2]
+        columns[str(one)] = columns[str(other)]
+    elif kind == "other quantity":
+        columns[str(rng.choice(["x", "y", "z"]))] = str(rng.choice(["gx", "mx", "heat", "t"]))
+    elif kind == "axes":
+        one, other = rng.permutation(["x", "y", "z"])[:2]
+        columns[str(one)], columns[str(other)] = columns[str(other)], columns[str(one)]
+    else:
+        signs = ["+", "+", "+"]
+        signs[int(rng.integers(3))] = "-"
+        return kind, content | {"signs": signs}
+    return kind, content | {"columns": columns, "units": units}
+
+
+def outcome(frame: pd.DataFrame, content: dict) -> str:
+    """The refusal or the remarks that ask to check; empty where the import says nothing."""
+    try:
+        recording = imported(frame, build(content, "t"), "f.csv")
+    except TumblelineError as problem:
+        return f"refused: {problem}"
+    return "; ".join(remark for remark in recording.remarks if "CHECK" in remark)
+
+
+@pytest.mark.parametrize("count", [FEW, pytest.param(MANY, marks=pytest.mark.slow, id="many")])
+def test_mistakes_are_refused_or_told_and_sound_imports_are_not(count: int) -> None:
+    silent, false = [], []
+    for number in range(count):
+        rng = np.random.default_rng([SEED, number])
+        _, content, frame = sound(rng)
+        said = outcome(frame, content)
+        if said:
+            false.append((number, content["units"], said))
+        kind, wrong = mistaken(rng, content, faces="poses" in content)
+        if not outcome(frame, wrong):
+            silent.append((number, kind, content["units"], wrong["units"], wrong["columns"]))
+    assert len(silent) <= 0.01 * count, silent
+    assert len(false) <= 0.01 * count, false

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,13 +21,12 @@ from typing import Any
 
 import psutil
 import pytest
-from capture_double import AT_ROOM, recipe_file
+from capture_double import BRIEF, recipe_file
 from lines import deployments, kill_all, order, worker
 from orchestrator import Orchestrator
 from postgres_server import Postgres, installed, postgres
 from root_process import ROOT, python
-from served_station import modbus_station, station_file
-from served_station import served as station_served
+from served_station import FAST, modbus_station, served, station_file
 from small_station import lot_of
 from wrong_clock import WrongClocks
 
@@ -42,14 +41,7 @@ SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "5"))
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200 + 600 * SHIFTS)]
 
 STATIONS = ("line-1", "line-2", "line-3")
-FAST: dict[str, object] = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
-QUICK = (
-    *AT_ROOM,
-    ('units = ["A1", "A2", "A3"]', 'units = ["U000", "U001"]'),
-    ("settle_s = 2.0", "settle_s = 0.2"),
-    ("static_record_s = 30.0", "static_record_s = 0.0"),
-    ('poses = "nine"', 'poses = "six"'),
-)
+QUICK = (*BRIEF, ('units = ["A1", "A2", "A3"]', 'units = ["U000", "U001"]'), ("settle_s = 2.0", "settle_s = 0.2"))
 SAFE_S = 90.0
 SHIFT_S = 900.0
 FULL_S = 5.0
@@ -77,17 +69,14 @@ class Server:
             **os.environ, "PREFECT_HOME": str(self.home), "PYTHONPATH": str(ROOT), CLIENT_KEY: self.key,
             "PREFECT_API_URL": f"http://127.0.0.1:{self.port}/api", "PREFECT_SERVER_ALLOW_EPHEMERAL_MODE": "false",
             "TUMBLELINE_ARCHIVE": str(self.home.parent / "disk" / "archive"),
-            "TUMBLELINE_STATE": str(self.home.parent / "state"), **self._database(),
+            "TUMBLELINE_STATE": str(self.home.parent / "state"),
         }  # fmt: skip
+        if self.database is not None:
+            address = self.home / "database"
+            address.touch(0o600)
+            address.write_text(self.database.address)
+            environment["TUMBLELINE_ORCHESTRATOR_DATABASE"] = str(address)
         return Orchestrator(self.home, self.port, self.key, environment)
-
-    def _database(self) -> dict[str, str]:
-        if self.database is None:
-            return {}
-        address = self.home / "database"
-        address.touch(0o600)
-        address.write_text(self.database.address)
-        return {"TUMBLELINE_ORCHESTRATOR_DATABASE": str(address)}
 
     def start(self) -> None:
         command = [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(self.port)]
@@ -126,21 +115,13 @@ class Soak:
     def __init__(self, folder: Path, server: Server, stack: ExitStack, *, disk: bool) -> None:
         self.folder, self.server, self.line, self.stack = folder, server, server.line, stack
         self.configurations: dict[str, Any] = {}
-        self.files: dict[str, str] = {}
         self.workers: dict[str, tuple[ExitStack, subprocess.Popen[bytes]]] = {}
-        self.faults: dict[str, Callable[[random.Random], None]] = {
-            "worker": self.worker_dies,
-            "server": self.server_dies,
-        }
-        self.clocks = WrongClocks(folder / "clocks") if WrongClocks.available() else None
+        self.faults = {"worker": self.worker_dies, "server": self.server_dies}
+        self.clocks = WrongClocks(folder / "clocks") if WrongClocks.available() else None  # without a C compiler
         if self.clocks is not None:
             self.faults["clock"] = self.clock_jumps
-        else:
-            print("without wrong clocks: no C compiler, or no GNU C library")  # noqa: T201 - part of the figures
         if server.database is not None:
             self.faults["database"] = self.database_dies
-        else:
-            print("without a killed database: PostgreSQL is not installed")  # noqa: T201 - part of the figures
         if disk:
             self.faults["disk"] = self.disk_fills
         self.happened: Counter[str] = Counter()
@@ -150,12 +131,11 @@ class Soak:
         recipe = recipe_file(self.folder, *QUICK)
         wanted = []
         for name in STATIONS:
-            port = self.stack.enter_context(station_served(lot_of(2)))
+            port = self.stack.enter_context(served(lot_of(2)))
             config = modbus_station(port, limits=FAST).model_copy(update={"name": name})
             self.configurations[name] = config
-            self.files[name] = str(station_file(self.folder, config, f"{name}.toml"))
             queue = {"name": "line", "work_queue_name": name}
-            parameters = {"recipe": recipe, "station": self.files[name]}
+            parameters = {"recipe": recipe, "station": str(station_file(self.folder, config, f"{name}.toml"))}
             policy = {"crashed": "continue"}
             wanted.append({"name": name, "work_pool": queue, "parameters": parameters, "policy": policy})
         python(self.line.environment, "-m", "pipelines.flows.deploy", deployments(self.folder, wanted))
@@ -173,8 +153,7 @@ class Soak:
 
     def clock_jumps(self, chance: random.Random) -> None:
         """The clock of a station is an hour wrong while it measures, then right again."""
-        name = chance.choice(STATIONS)
-        self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
+        name = self.measuring(chance)
         self.clocks.set(name, chance.choice((-OFF_S, OFF_S)))
         assert self.clocks.holds(self.workers[name][1].pid, name) > 1, "the worker and its flow have this clock"
         time.sleep(WRONG_S)
@@ -182,8 +161,7 @@ class Soak:
 
     def worker_dies(self, chance: random.Random) -> None:
         """The service of a worker is killed, with its flow; its station is safe before the service comes back."""
-        name = chance.choice(STATIONS)
-        self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
+        name = self.measuring(chance)
         own, process = self.workers[name]
         if process.poll() is None:
             kill_all(process)
@@ -199,8 +177,7 @@ class Soak:
 
     def database_dies(self, chance: random.Random) -> None:
         """The database is killed while stations measure, and comes back after some seconds."""
-        database, name = self.server.database, chance.choice(STATIONS)
-        self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
+        database, _ = self.server.database, self.measuring(chance)
         database.kill()
         time.sleep(chance.uniform(1.0, DATABASE_OFF_S))
         database.start()
@@ -217,9 +194,16 @@ class Soak:
                 time.sleep(FULL_S)
         filler.unlink()
 
-    def sampling(self, name: str) -> bool:
-        with open_devices(self.configurations[name], ()) as devices:
-            return devices.reader.sampling() == "running"
+    def measuring(self, chance: random.Random) -> str:
+        """A station, as soon as it measures."""
+
+        def sampling() -> bool:
+            with open_devices(self.configurations[name], ()) as devices:
+                return devices.reader.sampling() == "running"
+
+        name = chance.choice(STATIONS)
+        self.line.until(sampling, f"{name} measures", SHIFT_S)
+        return name
 
     def safe(self, name: str) -> bool:
         with open_devices(self.configurations[name], ()) as devices:
@@ -228,7 +212,7 @@ class Soak:
     def shift(self, number: int, chance: random.Random) -> None:
         """A lot at each station, a fault meanwhile; what failed is ordered again until each lot is complete."""
         for name in STATIONS:
-            self.order(name, number)
+            order(self.line, name, repeat=number + 1)
         time.sleep(chance.uniform(5.0, 25.0))
         fault = [*self.faults][number] if number < len(self.faults) else chance.choice([*self.faults])
         self.faults[fault](chance)
@@ -243,13 +227,10 @@ class Soak:
                     self.start_worker(name)
                     self.again += 1
                 if not (self.under_way(name, number) or self.complete(name, number)):
-                    self.order(name, number)  # it failed (a full disk): a person orders the same again
+                    order(self.line, name, repeat=number + 1)  # it failed (a full disk): a person orders the same again
             time.sleep(2.0)
         for name in STATIONS:
             self.line.until(lambda name=name: self.safe(name), f"{name} is safe", SAFE_S)
-
-    def order(self, name: str, number: int) -> None:
-        order(self.line, name, repeat=number + 1)
 
     def under_way(self, name: str, number: int) -> bool:
         """Whether a run of the order waits, works, or continues by its policy."""
@@ -276,7 +257,9 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
         disk = stack.enter_context(small_disk(tmp_path / "disk"))
         home = tmp_path / "orchestrator"
         home.mkdir(mode=0o700)
-        server = Server(home, free_port(), stack.enter_context(postgres()) if installed() else None)
+        with socket.create_server(("127.0.0.1", 0)) as probe:
+            port = probe.getsockname()[1]
+        server = Server(home, port, stack.enter_context(postgres()) if installed() else None)
         server.start()
         stack.callback(server.kill)
         soak = Soak(tmp_path, server, stack, disk=disk)
@@ -293,19 +276,11 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
         per_capture = Counter(path.parent.name for path in records)
         assert len(per_capture) == len(infos)
         assert set(per_capture.values()) == {8}, "six poses and two of verification, each once"
-        report = verify(archive, keys={})
-        assert report.whole, report.checked.findings
-        unsafe = [entry for entry in read_log(tmp_path / "state") if entry["event"] == "watchdog_failed"]
-        assert unsafe == []
+        assert verify(archive, keys={}).checked.findings == []
+        assert "watchdog_failed" not in {entry["event"] for entry in read_log(tmp_path / "state")}
         for name in ("server", *STATIONS):
             memory, files = zip(*(size[name] for size in sizes), strict=True)
             assert memory[-1] - memory[0] < GROWTH_MB, f"{name}: {memory} MB"
             assert files[-1] - files[0] < GROWTH_FILES, f"{name}: {files} open files"
         assert soak.happened.total() == SHIFTS
         print(dict(soak.happened), f"workers started again: {soak.again}", sizes)  # noqa: T201 - the figures of the soak
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

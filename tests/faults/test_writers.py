@@ -1,149 +1,85 @@
-"""Several writers at once, and killed ones: nothing is lost, nobody reads half of anything, debris is taken away."""
+"""Several writers at once, killed ones, killed compactions: nothing is lost, nobody reads half of anything, debris goes."""
 
 import os
+import shutil
 import signal
-import subprocess
 import sys
-import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import pytest
-from capture_double import CaptureDouble, small_job, small_run
+from capture_double import CaptureDouble, measured_run, small_job, small_run
 from ledger_events import day, event
-from root_process import ROOT
+from packed_archive import certified_archive, later, logical, packed_zips, single
 from typer.testing import CliRunner
 
-from pipelines.archive import Archive, files, hash_chain, parquet
+from pipelines.archive import Archive, files, hash_chain, packs, parquet
 from pipelines.archive.cleaning import clean
+from pipelines.archive.compaction import compact
 from pipelines.archive.locks import alone
 from pipelines.certificates import Ledger
+from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.integrity import verify
 from schemas.errors import ArchiveUnusable
 
-TESTS = ROOT / "tests"
 WRITERS = 8
 MANIFESTS = ("runs/*/*.json", "captures/*/[0-9]*/record.json", "calibrations/*/*/[0-9]*.json", "chain/*/[0-9]*.json")
 
-WRITER = """
-import sys
-from pathlib import Path
-sys.path[:0] = [{tests!r}, {root!r}]
-from capture_double import CaptureDouble, small_job
-from ledger_events import day
-from pipelines.archive import Archive
-from pipelines.chain.chain import ORDER
-from pipelines.chain.runner import Runner
-from pipelines.certificates import Ledger
-from pipelines.chain.certify import certify
 
-folder, archive, number = Path(sys.argv[1]), Archive(sys.argv[2]), int(sys.argv[3])
-folder.mkdir()
-for seed in (number, 99):  # a lot of its own, then the one that all of them work on
-    job = small_job(folder, ("seed = 5", f"seed = {{seed}}"), ('"A1", "A2", "A3"', f'"S{{seed}}", "T{{seed}}"'))
-    runner = Runner(job, archive, measure=CaptureDouble())
-    for stage in ORDER[:-1]:
-        runner.stage(stage)
-    runner.run.seal()
-    certify(Ledger(archive), runner.run, start=day(number), until=day(300), supersede=True)
-"""
-
-FLOOD = """
-import sys
-sys.path[:0] = [{tests!r}, {root!r}]
-from pathlib import Path
-from pipelines.archive import files
-folder, data, n = Path(sys.argv[1]), b"x" * 2_000_000, 0
-print("ready", flush=True)
-while True:
-    files.publish(folder / f"{{n % 7}}.bin", data)
-    files.publish_folder(folder / f"record-{{n}}", {{"a": data[:1000], "b": data[:1000]}})
-    n += 1
-"""
+def write(folder: Path, root: Path, number: int) -> None:
+    """A lot of its own, then the one that all of the writers work on."""
+    archive = Archive(root)
+    folder.mkdir()
+    for seed in (number, 99):
+        job = small_job(folder, ("seed = 5", f"seed = {seed}"), ('"A1", "A2", "A3"', f'"S{seed}", "T{seed}"'))
+        run = measured_run(job, archive, CaptureDouble())
+        run.seal()
+        certify(Ledger(archive), run, start=day(number), until=day(300), supersede=True)
 
 
-def start(text: str, *arguments: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", text.format(tests=str(TESTS), root=str(ROOT)), *map(str, arguments)]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "TUMBLELINE_SIGNING_KEY": ""}
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+def halves(root: Path) -> list[str]:
+    """What a look at every table and manifest finds broken."""
+    found = list[str]()
+    for path in root.glob("runs/*/*.parquet"):
+        try:
+            parquet.read_table(path, path.stem)
+        except ArchiveUnusable as problem:
+            found.append(str(problem))
+    for pattern in MANIFESTS:
+        for path in root.glob(pattern):
+            files.read_json(path)
+    return found
 
 
 @pytest.mark.slow
-def test_eight_writers_at_once_lose_nothing_and_nobody_reads_half(tmp_path: Path) -> None:
+def test_eight_writers_at_once_lose_nothing_and_nobody_reads_half(tmp_path: Path, monkeypatch) -> None:
     """Eight processes: each a lot and its certificates of its own, and all of them one more lot, at the same time."""
-    root = tmp_path / "archive"
-    Archive(root).prepare()
+    monkeypatch.setenv("TUMBLELINE_SIGNING_KEY", "")
+    root, numbers = tmp_path / "archive", range(1, WRITERS + 1)
+    archive, ledger = Archive(root), Ledger(root)
+    archive.prepare()
     job = small_job(tmp_path, ("seed = 5", "seed = 99"), ('"A1", "A2", "A3"', '"S99", "T99"'))
-    shared = Archive(root).capture(job.capture_id)
+    shared = archive.capture(job.capture_id)
     CaptureDouble()(job, shared, lambda *_: None)
     shared.complete()
-    writers = [start(WRITER, tmp_path / f"w{n}", root, n) for n in range(1, WRITERS + 1)]
-    halves, looks, over = list[str](), 0, threading.Event()
-
-    def look() -> None:
-        nonlocal looks
-        while not over.is_set():
-            for path in root.glob("runs/*/*.parquet"):
-                try:
-                    parquet.read_table(path, path.stem)
-                except ArchiveUnusable as problem:
-                    halves.append(str(problem))
-                looks += 1
-            for pattern in MANIFESTS:
-                for path in root.glob(pattern):
-                    files.read_json(path)
+    with ProcessPoolExecutor(WRITERS, get_context("spawn")) as writers:
+        written = [writers.submit(write, tmp_path / f"w{n}", root, n) for n in numbers]
+        while not all(one.done() for one in written):
+            assert halves(root) == []
             time.sleep(0.02)
-
-    reader = threading.Thread(target=look)
-    reader.start()
-    errors = [writer.communicate(timeout=240)[1] for writer in writers]
-    over.set()
-    reader.join()
-    assert [writer.returncode for writer in writers] == [0] * WRITERS, errors
-    assert halves == []
-    assert looks > 0
-    archive = Archive(root)
+        assert [one.exception() for one in written] == [None] * WRITERS
     assert len(archive.runs()) == WRITERS + 1
-    ledger = Ledger(archive)
-    for n in range(1, WRITERS + 1):
-        assert ledger.valid_at(f"S{n}", day(100)) is not None
+    assert all(ledger.valid_at(f"S{n}", day(100)) is not None for n in numbers)
     events = ledger.events("S99")
-    assert [e.sequence for e in events] == list(range(1, WRITERS + 1))
-    assert {e.start for e in events} == {day(n) for n in range(1, WRITERS + 1)}
-    report = verify(archive, keys={})
-    assert report.checked.findings == []
+    assert [e.sequence for e in events] == [*numbers]
+    assert {e.start for e in events} == {day(n) for n in numbers}
+    assert verify(archive, keys={}).checked.findings == []
     assert hash_chain.last_number(root) >= 3 * WRITERS
-    assert not list(root.rglob(f"{files.TEMPORARY}*"))
-
-
-@pytest.mark.slow
-def test_a_writer_killed_in_a_publish_leaves_only_what_clean_takes_away(tmp_path: Path) -> None:
-    root = tmp_path / "archive"
-    Archive(root).prepare()
-    folder = root / "runs" / "r-1"
-    folder.mkdir(parents=True)
-    left: list[Path] = []
-    for _ in range(20):
-        writer = start(FLOOD, folder)
-        assert writer.stdout.readline() == "ready\n"
-        end = time.monotonic() + 20.0
-        while not list(folder.glob(f"{files.TEMPORARY}*")) and time.monotonic() < end:
-            pass
-        writer.send_signal(signal.SIGKILL)
-        writer.communicate()
-        left = list(root.rglob(f"{files.TEMPORARY}*"))
-        if left:
-            break
-    assert left, "no kill met a publish"
-    assert {path.stat().st_size for path in folder.glob("*.bin")} <= {2_000_000}
-    assert all(len(list(path.iterdir())) == 2 for path in folder.glob("record-*"))
-    looked = clean(Archive(root), only_look=True)
-    assert sorted(looked.removed) == sorted(map(str, left))
-    assert list(root.rglob(f"{files.TEMPORARY}*"))
-    done = clean(Archive(root))
-    assert sorted(done.removed) == sorted(map(str, left))
     assert not list(root.rglob(f"{files.TEMPORARY}*"))
 
 
@@ -183,3 +119,95 @@ def test_what_a_killed_writer_left_out_of_the_chain_is_sealed_by_a_run_finished_
     assert (done.sealed, done.anchored) == ([run.id], 1)
     again = clean(run.archive)
     assert (again.sealed, again.anchored) == ([], 0)
+
+
+# -- compaction -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Archive:
+    return certified_archive(tmp_path / "archive")
+
+
+def reading(root: Path, names: list[str], ready: Any, stop: Any) -> None:
+    """Reads files of an archive again and again."""
+    place = Archive(root).root
+    expected = {name: (place / name).read_bytes() for name in names}
+    ready.set()
+    while not stop.is_set():
+        assert all((place / name).read_bytes() == data for name, data in expected.items())
+        assert all((place / name).is_file() for name in names)
+
+
+@pytest.mark.slow
+def test_a_reader_finds_every_file_while_packs_are_merged(archive: Archive) -> None:
+    compact(archive)
+    run = archive.run("latest").id
+    names = [name for name in logical(archive) if name.startswith((f"runs/{run}/", "calibrations/"))]
+    spawn = get_context("spawn")
+    ready, stop, merged = spawn.Event(), spawn.Event(), 0
+    reader = spawn.Process(target=reading, args=(Path(str(archive.root)), names, ready, stop), daemon=True)
+    reader.start()
+    assert ready.wait(60.0)
+    for count in range(12):
+        later(archive, f"runs/{run}/more/{count}.json", bytes(200_000 * (1 + count)))
+        before = len(packed_zips(archive))
+        compact(archive)
+        merged += len(packed_zips(archive)) <= before
+    stop.set()
+    reader.join(60.0)
+    assert reader.exitcode == 0
+    assert merged > 5
+
+
+def compacting(root: Path, left: int, *, opens: bool) -> None:
+    """A compaction that kills itself behind so many changes of the disk, and openings of packs."""
+
+    def counted(event: str, arguments: tuple) -> None:
+        nonlocal left
+        writes = event in {"os.rename", "os.remove", "os.rmdir", "os.truncate"}
+        if writes or (event == "open" and "packed" in str(arguments[0]) and opens):
+            left -= 1
+            if left < 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    sys.addaudithook(counted)
+    compact(Archive(root))
+
+
+def killed_and_again(archive: Archive, root: Path, step: int, *, opens: bool) -> int | None:
+    """The status of a compaction of a copy; every file is there, after it and after another one."""
+    expected = logical(archive)
+    shutil.copytree(str(archive.root), root)
+    process = get_context("spawn").Process(target=compacting, args=(root, step), kwargs={"opens": opens}, daemon=True)
+    process.start()
+    process.join(120.0)
+    assert logical(Archive(root)) == expected
+    compact(Archive(root))
+    assert logical(Archive(root)) == expected
+    return process.exitcode
+
+
+@pytest.mark.slow
+def test_killed_at_any_step_leaves_every_file(archive: Archive, tmp_path: Path) -> None:
+    for step in (1, 5, 7, 20, 150):  # before a zip, before its contents, between the packs, among the removals
+        root = tmp_path / f"archive-{step}"
+        assert killed_and_again(archive, root, step, opens=True) == -signal.SIGKILL
+        assert len(single(Archive(root))) < len(logical(archive)) // 10
+
+
+@pytest.mark.slow
+def test_killed_while_merging_leaves_every_file(archive: Archive, tmp_path: Path) -> None:
+    compact(archive)
+    run = archive.run("latest").id
+    size = (archive.root / packs.FOLDER / packed_zips(archive)[0]).stat().st_size
+    later(archive, f"runs/{run}/more.json", bytes(size))
+    for step in range(0, 60, 2):
+        root = tmp_path / f"archive-{step}"
+        status = killed_and_again(archive, root, step, opens=False)
+        assert len(list((root / packs.FOLDER).iterdir())) == 5  # a pack of the month, one of the ledger, and the lock
+        if status == 0:
+            break
+        assert status == -signal.SIGKILL
+    assert step > 6
+    assert status == 0
