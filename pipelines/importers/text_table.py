@@ -96,7 +96,7 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     # a line break inside a quoted field, or lines that the parser joins, moves all rows behind it
     line_by_line = len(lines) == len(text.splitlines()) and len(rows) == len(table)
     interval, stated_by = _stated_interval(lines[: detected.first])
-    words = _words(body, detected, table)
+    words = _words(body, detected, table, where)
     for name in filter(is_of_serials, words):
         table[name] = words[name]
     return Content(table, (*remarks, *stated_by), units, interval, ((where, rows),) if line_by_line else (), words)
@@ -183,15 +183,18 @@ def _read(body: Sequence[str], detected: Layout, names: list[str]) -> pd.DataFra
     return parsed(body)
 
 
-def _words(body: Sequence[str], detected: Layout, table: pd.DataFrame) -> dict[str, list[str]]:
+def _words(body: Sequence[str], detected: Layout, table: pd.DataFrame, where: str) -> dict[str, list[str]]:
     """Columns that may hold names, as they were written, where the parser took names for numbers, flags or gaps: 007, 1e5, NA."""
     may = [k for k in range(len(table.columns)) if _may_name(table.iloc[:, k])]
     if not may:
         return {}
-    written = pd.read_csv(
-        io.StringIO("\n".join(body)), sep=detected.divider, header=None, usecols=may, dtype=str, keep_default_na=False,
-        skipinitialspace=True, names=[*table.columns, *(["\0last"] if detected.trailing else [])], index_col=False,
-    )  # fmt: skip
+    with foreign(
+        f"{where}: rows that do not divide into the columns", "check the quotes and the dividers of its fields"
+    ):
+        written = pd.read_csv(
+            io.StringIO("\n".join(body)), sep=detected.divider, header=None, usecols=may, dtype=str, keep_default_na=False,
+            skipinitialspace=True, names=[*table.columns, *(["\0last"] if detected.trailing else [])], index_col=False,
+        )  # fmt: skip
     columns = {str(table.columns[k]): written.iloc[:, index].str.strip() for index, k in enumerate(may)}
     return {
         name: column.tolist()

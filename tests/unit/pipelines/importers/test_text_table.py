@@ -84,6 +84,15 @@ def test_units_in_a_line_broken_rows_short_rows_and_rows_of_another_width_are_wh
         read(tmp_path, "logger\nt,x,y\n1,2,3\n2,3,4\n3,4,5,6\n4,5,6\n")
 
 
+def test_quotes_around_the_ends_of_lines_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "history.csv"
+    path.write_text('",unit_C,chamber_C\n"' + "".join(f',{k}.0,26.0\n"' for k in range(25, 55)))
+    with pytest.raises(
+        DataRejected, match=r"history\.csv: rows that do not divide into the columns .*; check the quotes"
+    ):
+        files.read(path)
+
+
 def test_a_line_break_in_a_quoted_field_of_every_row_is_part_of_the_field() -> None:
     rows = "".join(f'0.{k},1.{k},"moved\nagain"\n' for k in range(1, 7))
     table = content(f"t,x,note\n{rows}", "x.csv").table
