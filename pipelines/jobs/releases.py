@@ -9,58 +9,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any
-
-from typing_extensions import TypedDict
+from typing import Any
 
 from pipelines.archive import Archive, files, hash_chain
 from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
+from pipelines.jobs.documents import ReleaseRecord
 from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.model_files import chosen_effects, effect_file_hashes, use_formulas
 from pipelines.jobs.recipes import load_recipe
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec, Recipe
-
-ReleaseRecord = TypedDict(
-    "ReleaseRecord",
-    {
-        "release": Annotated[int, "number, from 1"],
-        "model": str,
-        "version": int,
-        "effects": list[str],
-        "from": Annotated[str, "first moment of use, ISO date and time, UTC"],
-        "device": Annotated[str, "empty: every kind"],
-        "station": Annotated[str, "empty: every station"],
-        "reason": str,
-        "evidence": Annotated[str, "the what-if that supports it; empty if forced"],
-        "forced": bool,
-        "by": str,
-        "at": Annotated[str, "ISO date and time, UTC"],
-    },
-)
-ReleaseRecord.__doc__ = "A model that is released to the line."
-
-
-class ReleaseDocument(ReleaseRecord):
-    """``release MODEL --json``: the release that was made."""
-
-    archive: str
-
-
-class ListedRelease(ReleaseRecord):
-    """A release, and whether it is in use."""
-
-    in_use: Annotated[bool, "today, for its device and station"]
-
-
-class ReleaseListDocument(TypedDict):
-    """``release --json``: the releases of the archive, the oldest first."""
-
-    archive: str
-    releases: list[ListedRelease]
-
 
 FOLDER, EVIDENCE = "releases", "whatif"
 SCHEMA = 1
