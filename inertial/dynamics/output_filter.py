@@ -40,7 +40,8 @@ class OutputFilter:
         if not below.size or below[0] == 0:
             return float(grid[0] if below.size else top)
         low, high = float(grid[below[0] - 1]), float(grid[below[0]])
-        return float(brentq(lambda f: float(self._size(np.array([f]))[0]) - _HALF, low, high))
+        edge: Any = brentq(lambda f: float(self._size(np.array([f]))[0]) - _HALF, low, high)
+        return float(edge)
 
     @property
     def delay_s(self) -> float:
