@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import printed_pages as pages
 import pytest
-from c_compiler import compiled
+from c_compiler import FIXED, REAL, compiled
 from capture_double import LSB_PER_G, CaptureDouble, small_job
 from each import each
 from in_process import document_of, given, refused, text_of
@@ -22,6 +22,7 @@ from inertial.correction import output_covariance
 from inertial.state import State
 from pipelines.archive import Archive, Run
 from pipelines.chain.runner import Runner
+from pipelines.export import ExportSettings, export_files, unit_calibrations
 from pipelines.tables.calibration import read_calibration
 
 pytestmark = pytest.mark.usefixtures("home")
@@ -105,6 +106,18 @@ def test_the_covariance_of_the_noise_covers_the_error(run: Run, rng: np.random.G
         )
         pulls.append((corrected - force) / np.sqrt(np.diagonal(own, axis1=1, axis2=2) + (0.29 / LSB_PER_G) ** 2))
     assert 0.65 < np.sqrt(np.mean(np.square(pulls))) < 1.35  # 45 coefficients were drawn
+
+
+def test_the_arithmetic_is_that_of_the_exported_c(run: Run, home: Path, rng: np.random.Generator) -> None:
+    force = rng.normal(size=(300, 3))
+    force /= np.linalg.norm(force, axis=1)[:, None]
+    table = raw(run, force, np.round(rng.uniform(0, 50, 300), 3), rng, np.zeros(3))
+    _, done = corrected(run, table)
+    unit = unit_calibrations(run, ("A1",), failed=True)
+    for arithmetic, call, within in (("double", REAL.replace("REAL", "double"), 1e-9), ("q24", FIXED, 1e-6)):
+        [header] = export_files("c", unit, run.id, ExportSettings(arithmetic=arithmetic)).values()
+        own = compiled(header.decode(), call, table[["x", "y", "z", "unit_C"]].to_numpy(), home, "A1")
+        assert np.max(np.abs(own - done[FORCES].to_numpy())) < within
 
 
 def test_the_bias_is_found_where_the_force_is_known_and_its_uncertainty_grows_after(

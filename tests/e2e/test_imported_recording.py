@@ -112,6 +112,17 @@ def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate() -> N
     text_of("verify", status=0)
 
 
+@pytest.mark.slow
+def test_an_import_a_fit_and_a_diagnosis_of_one_file_say_the_same() -> None:
+    first = imported(Recording(40, "white 280, B 30"), 5, "--fit", "norm", status=None)
+    fitted = document_of("fit", first["run"], "--effects", PLAIN)
+    judged = document_of("diagnose", first["run"])
+    for key in ("rms_ug", "floor_ug", "white_noise_ug", "p_value"):
+        assert first["error"][key] == fitted["error"][key] == judged["error"][key]
+    assert first["adequate"] is fitted["adequate"] is judged["adequate"]
+    assert first["error"]["fit_rms_ug"] == pytest.approx(first["error"]["rms_ug"], rel=1e-3)
+
+
 def test_an_import_that_was_not_fitted_is_advised_and_a_fit_that_fails_leaves_no_run() -> None:
     run = imported(Recording(20), 2)["run"]
     for words in (("export", run), ("show", run, "--report")):
