@@ -121,7 +121,7 @@ def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
             effects.get(name)
         except UnknownEffect as problem:
             raise RecipeInvalid(
-                f"{where}: unknown effect '{shown(name)}'; {did_you_mean(name, effects.catalogue())}; "
+                f"{where}: unknown effect '{shown(name, 40)}'; {did_you_mean(name, effects.catalogue())}; "
                 "one of a Python file needs --effect-file FILE.py, or its package",
                 key="effects",
                 close=problem.close,
