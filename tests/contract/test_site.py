@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from docs import build_site
 from docs.build_site import CONFIGURATION, NEEDED, ROOT, modules, navigation, stage
 
 ELSEWHERE = re.compile(r"<(?:script|img|link|iframe|source)\b[^>]*?\b(?:src|href)=[\"']?(?:https?:)?//[^>]*>")
+BUILT = pytest.mark.skipif(any(find_spec(name) is None for name in NEEDED), reason="the extra 'docs' is not installed")
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +39,8 @@ def test_every_page_and_module_is_in_the_site_which_loads_nothing_of_others_and_
     assert set(content["validation"]["links"].values()) == {"warn"}  # an error with --strict
 
 
+@BUILT
 @pytest.mark.slow
-@pytest.mark.skipif(any(find_spec(name) is None for name in NEEDED), reason="the extra 'docs' is not installed")
 def test_the_site_is_built_is_searched_without_a_server_and_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
     assert build_site.build(tmp_path) == 0
     pages = list(tmp_path.rglob("*.html"))
@@ -48,5 +50,40 @@ def test_the_site_is_built_is_searched_without_a_server_and_loads_nothing_from_e
     index = json.loads(script[script.index("{") : script.rindex("}") + 1])
     words = " ".join(entry["text"] for entry in index["docs"])
     assert "specific force" in words
+    assert results_of("hysteresis", tmp_path / "index.html") >= 5
     effect = tmp_path / "docs" / "reference" / "inertial" / "inertial.effects.third_order.html"
     assert "doc-heading" in effect.read_text(encoding="utf-8")
+
+
+def results_of(word: str, page: Path) -> int:
+    """Number of pages that the search of the site gives in a browser without a network, on files without a server."""
+    program = shutil.which("chromium")
+    if program is None:
+        pytest.skip("chromium is not installed; the index was read above")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        opened = browser.new_page()
+        asked: list[str] = []
+        opened.on("request", lambda request: asked.append(request.url))
+        opened.goto(page.as_uri())
+        opened.fill("input.md-search__input", word, timeout=120_000)
+        opened.wait_for_selector(".md-search-result__item", timeout=120_000)
+        count = opened.locator(".md-search-result__item").count()
+        browser.close()
+    assert [address for address in asked if not address.startswith(("file:", "data:", "blob:"))] == []
+    return count
+
+
+@BUILT
+@pytest.mark.slow
+@pytest.mark.parametrize("link", ["[gone](gone.md)", "[no anchor](units.md#gone)"])
+def test_a_link_that_leads_nowhere_stops_the_build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, link: str) -> None:
+    linked = build_site._linked
+    wrong = {"docs/decisions/README.md": f"\n{link}\n"}
+    monkeypatch.setattr(
+        build_site, "_linked", lambda page, folder: linked(page, folder) + wrong.get(str(page.relative_to(ROOT)), "")
+    )
+    monkeypatch.setattr(build_site, "modules", lambda: ["inertial.frames"])
+    assert build_site.build(tmp_path) != 0

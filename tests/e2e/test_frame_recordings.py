@@ -79,6 +79,21 @@ def test_a_replayed_run_gives_the_same_tables_bit_for_bit(recorded_run, tmp_path
     assert re.search(r"replay: .* continues with", departed.stderr), departed.stderr
 
 
+@pytest.mark.slow
+def test_a_run_with_faults_of_the_wire_is_replayed_with_them(tmp_path):
+    recipe, frames = recipe_file(tmp_path, *QUICK), tmp_path / "run.jsonl"
+    faults = ["--fault", "time_out:at_s=37.5", "--fault", "silent:device=reader:at_s=60:for_s=3"]
+    first, _ = made(recipe, tmp_path / "one", "--record", str(frames), *faults)
+    assert {e.failed for e in read_frames(frames).exchanges} >= {"", "silence"}
+    again, _ = made(recipe, tmp_path / "two", "--replay", str(frames), *faults)
+    for name in sorted({*first.tables()} - {"events"}):
+        assert first.table(name).equals(again.table(name)), name
+    told, then = (
+        [re.sub(r"127\.0\.0\.1:\d+", "", one) for one in run.table("events")["reason"]] for run in (first, again)
+    )
+    assert told == then  # the simulated station is at another port in every process
+
+
 @contextmanager
 def read_by_us(port, name="watlow_f4t", device_id=3, timeout_s=2.0):
     """A client of ours at a port."""

@@ -162,6 +162,22 @@ def test_a_changed_model_is_not_shown_with_the_coefficients_of_the_import(rng: n
     assert "scale 0.1031" in given("fit", run, "--model", "model.toml")[1]  # 1.012 over 9.80665
 
 
+@pytest.mark.slow  # as one recording: tests/e2e/test_python.py and test_import.py
+def test_several_files_of_one_sensor_are_one_recording_in_one_command(rng: np.random.Generator) -> None:
+    """Two sessions with a clock that restarts."""
+    _, frame = hand_held(rng, stops=28, rate=50.0)
+    half = len(frame) // 2
+    for name, part in (("a.csv", frame.iloc[:half]), ("b.csv", frame.iloc[half:])):
+        own = part.set_axis(["t", "ax", "ay", "az", "gx", "gy", "gz"], axis=1)
+        own.assign(t=np.arange(len(own)) / 50.0).to_csv(name, index=False)
+    document = document_of("improve", "a.csv", "b.csv", status=0)
+    one = document["recording"]
+    assert one["files"] == ["a.csv", "b.csv"]
+    assert "--set join=rows" in one["command"]
+    assert 26 <= one["dwells"] <= 30
+    assert document_of(*shlex.split(one["command"])[1:], status=0)["run"] == one["run"]
+
+
 SIX = np.array([sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)])
 SIX_POSES = ",".join(f"dwell {k}={face}" for k, face in enumerate(("+x", "-x", "+y", "-y", "+z", "-z")))
 MAPPED = ("--map", "time=time_s,x=x,y=y,z=z", "--unit-of", "output=g,time=s", "--units", "S1")
