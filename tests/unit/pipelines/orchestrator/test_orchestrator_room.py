@@ -4,9 +4,11 @@ import gc
 from contextlib import suppress
 
 import pytest
+import yaml
 from each import each
 from hypothesis import given
 from hypothesis import strategies as st
+from root_process import ROOT
 
 from pipelines.archive import Archive
 from pipelines.orchestrator.archive_address import (
@@ -116,3 +118,11 @@ def test_nothing_is_searched_while_it_is_imported_and_the_collector_is_as_before
     finally:
         gc.unfreeze()
         gc.enable() if before else gc.disable()
+
+
+def test_the_deployments_of_the_product_state_a_policy() -> None:
+    content = yaml.safe_load((ROOT / "deploy" / "prefect.yaml").read_text(encoding="utf-8"))
+    policies = {one["name"]: policy_of(one["name"], one["policy"]) for one in content["deployments"]}
+    assert policies["production-line"] == Policy(crashed="continue")
+    assert policies["on-demand"] == Policy()
+    assert policies["weekly-audit"].missed == "latest"
