@@ -127,7 +127,8 @@ def stamps(column: pd.Series, where: str, zone: str = "") -> RecordingClock:
         A row has no time, or day and month are ambiguous and matter.
     """
     name = shown(str(column.name))
-    text = column.astype(str).str.strip().str.replace(_FRACTION, r"\1.\2", regex=True)
+    with foreign(f"{where}: column '{name}': bytes that are no text", "give seconds, or ISO stamps"):
+        text = column.astype(str).str.strip().str.replace(_FRACTION, r"\1.\2", regex=True)
     if column.notna().all() and bool(text.str.match(_CLOCK).all()):
         with foreign(f"{where}: column '{name}': times of day that cannot be read", "give seconds, or ISO stamps"):
             pointed = text.str.replace(r":(\d+)$", r".\1", regex=True) if text.iloc[0].count(":") == 3 else text

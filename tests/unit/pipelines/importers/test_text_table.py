@@ -84,6 +84,11 @@ def test_units_in_a_line_broken_rows_short_rows_and_rows_of_another_width_are_wh
         read(tmp_path, "logger\nt,x,y\n1,2,3\n2,3,4\n3,4,5,6\n4,5,6\n")
 
 
+def test_stamps_of_bytes_that_are_no_text_are_refused() -> None:
+    with pytest.raises(DataRejected, match=r"m: column 't': bytes that are no text .*; give seconds, or ISO stamps"):
+        stamps(pd.Series([b"\xff\xfe", b"12:00:00"], name="t", dtype=object), "m")
+
+
 def test_quotes_around_the_ends_of_lines_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "history.csv"
     path.write_text('",unit_C,chamber_C\n"' + "".join(f',{k}.0,26.0\n"' for k in range(25, 55)))
